@@ -89,7 +89,6 @@ function Example({ id }: { id: Id }) {
           label={GALLERY.play}
           name={GALLERY.playOf(title)}
           icon="play"
-          kind="small"
           onClick={play}
           disabled={!isLive}
         />

@@ -28,7 +28,7 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
         <h2>{title}</h2>
         <Stops now={stop} go={go} />
         <div class="tour-ways">
-          <Button label={TOUR.back} onClick={() => go(stop - 1)} kind="small" disabled={stop === 0} />
+          <Button label={TOUR.back} onClick={() => go(stop - 1)} disabled={stop === 0} />
           <Button
             label={isLast ? TOUR.finish : TOUR.next}
             onClick={() => go(stop + 1)}

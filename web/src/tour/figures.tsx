@@ -112,7 +112,6 @@ function Times({ guide, reports }: Figure) {
       <Button
         label={TOUR.again}
         icon="reset"
-        kind="small"
         onClick={() => void guide.measure(stopsOf(isOnCard).times.binds)}
       />
     </>
@@ -150,7 +149,6 @@ function Errors({ app, guide, reports }: Figure) {
                       label={scientific(report.rest_error.mean_rel)}
                       name={TOUR.showError(grid, tau, report.rest_error.mean_rel)}
                       pressed={grid === gridNow && tau === tauNow}
-                      kind="small"
                       onClick={() => void guide.show(paper(grid, tau))}
                     />
                   )}
@@ -226,7 +224,6 @@ function Smooth({ app }: Figure) {
       <Button
         label={TOUR.bone}
         icon="bone"
-        kind="small"
         disabled={inner > 0}
         onClick={() => void app.controls.add("line", BONE)}
       />

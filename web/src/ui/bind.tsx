@@ -115,13 +115,8 @@ function Ways({ app }: { app: App }) {
   return (
     <>
       <div class="row even">
-        <Button label={T.bind.ours} onClick={() => preset(BIND_DEFAULTS)} kind="small" tip={T.bind.oursTip} />
-        <Button
-          label={T.bind.published}
-          onClick={() => preset(PAPER_DEFAULTS)}
-          kind="small"
-          tip={T.bind.publishedTip}
-        />
+        <Button label={T.bind.ours} onClick={() => preset(BIND_DEFAULTS)} tip={T.bind.oursTip} />
+        <Button label={T.bind.published} onClick={() => preset(PAPER_DEFAULTS)} tip={T.bind.publishedTip} />
       </div>
       <Segments
         label={options.method === "classic" && options.cell_shape === "box" ? T.bind.gridEach : T.bind.grid}
@@ -171,7 +166,7 @@ function Place({ app }: { app: App }) {
       {!lack && adapter !== "" && backend !== "cpu" && <p class="hint">{card}</p>}
       {lack && (
         <div class="row">
-          <Button label={T.without.title} onClick={() => app.store.set({ waysOpen: true })} kind="small" />
+          <Button label={T.without.title} onClick={() => app.store.set({ waysOpen: true })} />
         </div>
       )}
     </>

@@ -118,9 +118,7 @@ function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
     <div class={`problem-card ${problem.severity}`}>
       <Icon name={problem.severity === "note" ? "info" : "warning"} />
       <Say kind="grow" text={sentence(problem.message)} />
-      {fix && !isDone && (
-        <Button label={sayMend(fix, problem.count)} onClick={() => app.cage.mend(fix)} kind="small" />
-      )}
+      {fix && !isDone && <Button label={sayMend(fix, problem.count)} onClick={() => app.cage.mend(fix)} />}
       {isDone && <Badge kind="good" icon="check" text={T.cage.fineEnough} />}
     </div>
   );

@@ -47,8 +47,8 @@ function PlainButton({ icon, kind = "", tip, name, pressed, children, ...rest }:
   );
 }
 
-/** Button with text and an optional icon. */
-export function Button({ label, kind = "", ...rest }: ButtonProps) {
+/** Button with text and an optional icon. It is small unless `kind` says otherwise. */
+export function Button({ label, kind = "small", ...rest }: ButtonProps) {
   return (
     <PlainButton {...rest} kind={`button ${kind}`}>
       <span>{label}</span>

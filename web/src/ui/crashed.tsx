@@ -34,7 +34,7 @@ export function askAfterCrash(crash: Crash, startFresh: () => void): void {
         <Report crash={crash} />
         <div class="row wrap">
           <Button label={T.works.fresh} onClick={startFresh} kind="primary" />
-          <Button label={T.tryAgain} onClick={() => location.reload()} />
+          <Button label={T.tryAgain} onClick={() => location.reload()} kind="" />
         </div>
       </div>
     </Dialog>,

@@ -56,14 +56,13 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
               key={kind}
               label={T.cage.kinds[kind]}
               icon={icon}
-              kind="small"
               tip={T.cage.kindTips[kind]}
               pressed={placing === kind}
               disabled={!cage.usable}
               onClick={() => app.controls.arm(placing === kind ? null : kind)}
             />
           ))}
-          <Button label={T.cage.openControls} icon="file" kind="small" onClick={app.chooseControls} />
+          <Button label={T.cage.openControls} icon="file" onClick={app.chooseControls} />
         </div>
         {placing && <p class="hint">{T.cage.kindTips[placing]}</p>}
         {inner > 0 && (
@@ -74,11 +73,10 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
               <Button
                 label={T.cage.removeSelected}
                 icon="trash"
-                kind="small"
                 disabled={!isSelected}
                 onClick={app.controls.remove}
               />
-              <Button label={T.cage.clear} icon="close" kind="small" onClick={app.controls.clear} />
+              <Button label={T.cage.clear} icon="close" onClick={app.controls.clear} />
             </div>
             <p class="hint">{T.cage.moveThem(app.key("restMode"))}</p>
           </>

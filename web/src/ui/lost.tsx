@@ -57,7 +57,7 @@ export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () =
           {retry && (
             <div class="row">
               <Button label={T.tryAgain} onClick={() => void recover()} kind="primary" />
-              <Button label={T.reload} onClick={() => location.reload()} />
+              <Button label={T.reload} onClick={() => location.reload()} kind="" />
             </div>
           )}
         </div>

@@ -38,8 +38,8 @@ export function ModelPanel({ app }: { app: App }) {
           <p class="hint">{T.model.kinds}</p>
         </div>
         <div class="row wrap">
-          {model && <Button label={T.panel.open} onClick={app.chooseModel} icon="file" kind="small" />}
-          <Button label={T.model.openFolder} onClick={app.chooseFolder} icon="open" kind="small" />
+          {model && <Button label={T.panel.open} onClick={app.chooseModel} icon="file" />}
+          <Button label={T.model.openFolder} onClick={app.chooseFolder} icon="open" />
         </div>
       </div>
       {works.length > 0 && (
@@ -48,7 +48,6 @@ export function ModelPanel({ app }: { app: App }) {
             label={T.model.kept(works.length)}
             onClick={() => app.store.set({ worksOpen: true })}
             icon="save"
-            kind="small"
           />
         </div>
       )}

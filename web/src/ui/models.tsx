@@ -33,7 +33,7 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
           </>
         )}
         <div class="row">
-          <Button label={T.models.add} icon="plus" kind="small" onClick={app.chooseMore} />
+          <Button label={T.models.add} icon="plus" onClick={app.chooseMore} />
           <p class="hint grow">{isTouch ? T.models.addHintTouch : T.models.addHint}</p>
         </div>
       </div>
@@ -84,7 +84,6 @@ function Row({ app, member, body }: { app: App; member: MemberInfo; body: Member
           <Button
             label={T.models.dress(body.name)}
             icon="bone"
-            kind="small"
             tip={T.models.dressTip(body.name)}
             onClick={() => void app.models.dress(id, body.id)}
           />
@@ -172,12 +171,12 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
   const { painting } = app.store.get();
   const isOn = painting?.id === id;
   const clear = painted && (
-    <Button label={T.models.clear} icon="close" kind="small" onClick={() => app.painting.clear(id)} />
+    <Button label={T.models.clear} icon="close" onClick={() => app.painting.clear(id)} />
   );
   if (!isOn)
     return (
       <div class="row wrap">
-        <Button label={T.models.paint} icon="brush" kind="small" onClick={() => app.painting.on(id)} />
+        <Button label={T.models.paint} icon="brush" onClick={() => app.painting.on(id)} />
         {clear}
       </div>
     );
@@ -197,7 +196,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
         {...fieldsOf(painting, app.painting.brush)("radius")}
       />
       <div class="row wrap">
-        <Button label={T.models.done} icon="check" kind="small" onClick={() => app.painting.on(null)} />
+        <Button label={T.models.done} icon="check" onClick={() => app.painting.on(null)} />
         {clear}
       </div>
     </fieldset>

@@ -69,7 +69,7 @@ function PullOptions({ app }: { app: App }) {
       {pins.length > 0 && (
         <div class="row">
           <span class="grow">{T.pull.pins(pins.length)}</span>
-          <Button label={T.pull.unpinAll} onClick={app.pull.unpinAll} kind="small" />
+          <Button label={T.pull.unpinAll} onClick={app.pull.unpinAll} />
         </div>
       )}
     </div>
@@ -184,14 +184,12 @@ function Poses({ app }: { app: App }) {
           label={playing ? T.pose.stop : T.pose.play}
           onClick={() => app.run("play")}
           icon={playing ? "stop" : "play"}
-          kind="small"
           disabled={places.length === 0}
         />
         <Button
           label={T.pose.reset}
           onClick={() => app.run("resetPose")}
           icon="reset"
-          kind="small"
           tip={T.pose.resetTip(app.key("resetPose"))}
           disabled={!posed}
         />
@@ -200,7 +198,7 @@ function Poses({ app }: { app: App }) {
         <div class="empty-state">
           <Icon name="pose" />
           <p>{T.pose.empty}</p>
-          <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" kind="small" />
+          <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" />
         </div>
       )}
       {/* Pictures are drawn while the pointer is here, because they delay picking in the view. */}
@@ -328,7 +326,6 @@ function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: Po
         <Button
           label={T.pose.show}
           onClick={() => app.poses.apply(index)}
-          kind="small"
           tip={T.pose.showTip(name, app.key("undo"))}
         />
         <IconButton
@@ -352,12 +349,7 @@ function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: Po
           />
           <span aria-hidden="true">s</span>
         </div>
-        <Button
-          label={T.pose.update}
-          name={T.pose.updateOf(name)}
-          onClick={() => app.poses.update(index)}
-          kind="small"
-        />
+        <Button label={T.pose.update} name={T.pose.updateOf(name)} onClick={() => app.poses.update(index)} />
         <IconButton
           icon="copy"
           label={T.pose.duplicate(name)}

@@ -21,7 +21,6 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
           <Button
             label={T.tour.begin}
             icon="tour"
-            kind="small"
             onClick={() => {
               onClose();
               app.run("tour");

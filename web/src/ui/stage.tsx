@@ -90,7 +90,7 @@ function Placing({ app }: { app: App }) {
   return (
     (placing || painting) && (
       <div class="floating placing">
-        <Button label={label} kind="small" onClick={end} />
+        <Button label={label} onClick={end} />
       </div>
     )
   );
@@ -217,7 +217,7 @@ function Busy({ app }: { app: App }) {
       <p class="hint">{busyStep}</p>
       {busyFraction > 0 && !goOn && <progress max="1" value={busyFraction} aria-label={busyStep} />}
       <div class="row">
-        {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" kind="small" />}
+        {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" />}
         {goOn && <Button label={T.opening.anyway} onClick={goOn} kind="small primary" />}
       </div>
     </div>

@@ -144,7 +144,7 @@ function Item({ toast: { title, text, fixes, stays }, close }: { toast: Toast; c
               close();
               run();
             };
-            return <Button key={label} label={label} kind="small" onClick={take} />;
+            return <Button key={label} label={label} onClick={take} />;
           })}
         </div>
       )}

@@ -40,8 +40,8 @@ export function WorksList({ app }: { app: App }) {
         </ul>
         <p class="hint">{T.works.about(KEPT_DAYS)}</p>
         <div class="row wrap">
-          <Button label={T.panel.open} onClick={() => leave(app.chooseModel)} icon="file" />
-          <Button label={T.works.sample} onClick={() => leave(app.startFresh)} />
+          <Button label={T.panel.open} onClick={() => leave(app.chooseModel)} icon="file" kind="" />
+          <Button label={T.works.sample} onClick={() => leave(app.startFresh)} kind="" />
         </div>
       </div>
     </Dialog>
@@ -63,7 +63,7 @@ function Row({ work, open, remove }: { work: Work; open: () => void; remove: () 
         {stopped && <p class="hint">{T.works.stopped}</p>}
       </div>
       <div class="row">
-        {where !== "here" && <Button label={opens} name={`${opens} ${name}`} onClick={open} kind="small" />}
+        {where !== "here" && <Button label={opens} name={`${opens} ${name}`} onClick={open} />}
         {where !== "elsewhere" && <Delete name={name} remove={remove} />}
       </div>
     </li>
