@@ -57,7 +57,7 @@ function readAll(
     let vertices = 0;
     let used = before;
     for (const [k, own] of models.entries()) {
-      if (isGivenUp) throw cancelled("cancelled");
+      if (isGivenUp) throw cancelled();
       const name = own[0]?.name ?? "";
       ctx.store.set({ busy: T.opening.fileOf(name, k, models.length) });
       if (own[0]?.file.size === 0) {
