@@ -139,7 +139,7 @@ pub(crate) fn write_lattice(
     }
     let (_, field) = field_of_deform(args, model)?;
     let bytes = match args.lattice_format {
-        LatticeFormat::Npz => write_field_npz(&field, model.origin()),
+        LatticeFormat::Npz => write_field_npz(&field, model.origin(), model.up()),
         LatticeFormat::Blender => write_field_blender(&field, model.up().vector_turned(model.origin())),
     };
     write(output, &bytes)?;

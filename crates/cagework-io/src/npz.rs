@@ -21,12 +21,13 @@ use cagework_core::deform::OutsideVertex;
 use cagework_core::field::Field;
 use cagework_core::weights::WeightsError;
 use cagework_core::{Frames, Weights};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat3, UVec3, Vec3};
 use thiserror::Error;
 use zip::result::ZipError;
 
 use crate::memory::MemoryError;
 use crate::shown::shown;
+use crate::up::UpAxis;
 use arrays::{Archive, NpyArray, NpzWriter, array, npy_header, required};
 
 /// Error of reading a weights file.
@@ -155,27 +156,41 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
     zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
 }
 
-/// Writes a field as an `.npz` file with these arrays:
+/// Writes a field as an `.npz` file with these arrays, in the axes of the files, whose up axis is `up`:
 ///
 /// - `origin` (float64, `[3]`): position of the first node, to which the argument `origin` was added;
 /// - `spacing` (float64): distance between adjacent nodes;
 /// - `u` (float32, `[nx, ny, nz, 3]`): displacements;
 /// - `F` (float32, `[nx, ny, nz, 3, 3]`): deformation gradients, `F @ d` maps a small vector `d`;
 /// - `bound` (bool, `[nx, ny, nz]`): whether a node is inside the cage or at most two cells from the cage.
+///
+/// The field has y up. `origin` is in the axes of the files.
 #[must_use]
-pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
+pub fn write_field_npz(field: &Field, origin: DVec3, up: UpAxis) -> Vec<u8> {
     let lattice = &field.lattice;
-    let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
+    // An axis of the files may run against an axis of the field. The first node is then the field's last one there.
+    let is_reversed = up.vector_turned(DVec3::ONE).cmplt(DVec3::ZERO);
+    let first = DVec3::select(is_reversed, (lattice.dims - 1).as_dvec3(), DVec3::ZERO);
+    let dims = up.vector_turned_back(lattice.dims.as_dvec3()).abs().as_uvec3();
+    let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     // z is the fastest axis of the arrays, but x is the fastest axis of the field.
-    let nodes =
-        || (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| x + nx * (y + ny * z))));
+    let in_field = |node: UVec3| {
+        let [x, y, z] = (first + up.vector_turned(node.as_dvec3())).to_array().map(|n| n as usize);
+        x + lattice.dims.x as usize * (y + lattice.dims.y as usize * z)
+    };
+    let of_row = |x, y| (0..dims.z).map(move |z| in_field(UVec3::new(x, y, z)));
+    let nodes = || (0..dims.x).flat_map(move |x| (0..dims.y).flat_map(move |y| of_row(x, y)));
     let mut zip = NpzWriter::new(13 * 4 * field.values.len(), 9 * 4 * field.values.len());
-    let first = origin + lattice.origin.as_dvec3();
-    zip.put("origin", "<f8", &[3], first.to_array().map(f64::to_le_bytes));
+    let corner = lattice.origin.as_dvec3() + f64::from(lattice.cell) * first;
+    let start = origin + up.vector_turned_back(corner);
+    zip.put("origin", "<f8", &[3], start.to_array().map(f64::to_le_bytes));
     zip.put("spacing", "<f8", &[], [f64::from(lattice.cell).to_le_bytes()]);
-    let of_node = |k: usize| field.values[k].truncate().to_array();
+    let of_node =
+        |k: usize| up.vector_turned_back(field.values[k].truncate().as_dvec3()).as_vec3().to_array();
     zip.put("u", "<f4", &[nx, ny, nz, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
-    let of_node = |k: usize| field.node_gradient(k).transpose().to_cols_array();
+    let turn = Mat3::from_mat4(up.turn());
+    // The transpose of R^T F R, because columns are stored one after another and the array has rows first.
+    let of_node = |k: usize| (turn.transpose() * field.node_gradient(k).transpose() * turn).to_cols_array();
     zip.put("F", "<f4", &[nx, ny, nz, 3, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
     zip.put("bound", "|b1", &[nx, ny, nz], nodes().map(|k| [u8::from(field.values[k].w > 0.0)]));
     zip.finish()

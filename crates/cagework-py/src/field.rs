@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cagework_core::bind::BindError;
 use cagework_core::field::{CELLS, CELLS_RANGE, Field as CoreField, FieldWeights, InverseField};
-use cagework_io::write_field_npz;
+use cagework_io::{UpAxis, write_field_npz};
 use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
@@ -136,7 +136,7 @@ impl Field {
     /// [...]
     #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        files::write(&path, &write_field_npz(&self.field, self.cage.get().origin()))
+        files::write(&path, &write_field_npz(&self.field, self.cage.get().origin(), UpAxis::Y))
     }
 }
 

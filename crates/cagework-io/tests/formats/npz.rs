@@ -5,8 +5,8 @@ use std::io::{Cursor, Read as _, Write as _};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::field::{Field, Lattice};
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
-use cagework_io::{SavedWeights, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
-use glam::{DVec3, Vec3};
+use cagework_io::{SavedWeights, UpAxis, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
+use glam::{DVec3, UVec3, Vec3};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -57,49 +57,106 @@ fn points_of_a_rig_are_the_last_rows() {
     assert_eq!(message, "array 'extra_points': has 4 points, but the matrix has 3 rows");
 }
 
-#[test]
-fn field_is_written_with_z_as_the_fastest_axis() {
-    // The displacement at every node is u = (0.1 y, 0.2 z, 0.3 x).
-    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 4.0, 8.0) };
-    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
-    let lattice = Lattice::new(&cage, 32);
-    let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
-    assert!(nx < ny && ny < nz);
-    let place = |x: usize, y: usize, z: usize| {
-        lattice.origin + lattice.cell * Vec3::new(x as f32, y as f32, z as f32)
-    };
-    let by = |p: Vec3| Vec3::new(0.1 * p.y, 0.2 * p.z, 0.3 * p.x);
-    let mut values = Vec::new();
-    for z in 0..nz {
-        for y in 0..ny {
-            values.extend((0..nx).map(|x| by(place(x, y, z)).extend(1.0)));
+/// Arrays of a field whose displacements are `u = (0.1 y, 0.2 z, 0.3 x)`, in the axes of files with this up axis.
+struct WrittenField {
+    lattice: Lattice,
+    dims: [usize; 3],
+    origin: DVec3,
+    u: Vec<f32>,
+    gradients: Vec<f32>,
+}
+
+impl WrittenField {
+    fn new(up: UpAxis) -> Self {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 4.0, 8.0) };
+        let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+        let lattice = Lattice::new(&cage, 32);
+        let [nx, ny, nz] = lattice.dims.to_array();
+        assert!(nx < ny && ny < nz);
+        let mut values = Vec::new();
+        for z in 0..nz {
+            for y in 0..ny {
+                let place = |x| lattice.origin + lattice.cell * UVec3::new(x, y, z).as_vec3();
+                values.extend((0..nx).map(|x| displacement(place(x)).extend(1.0)));
+            }
+        }
+        let bytes = write_field_npz(&Field::of_values(lattice.clone(), values), FAR, up);
+        let dims = match up {
+            UpAxis::Z => [nx, nz, ny],
+            UpAxis::Y | UpAxis::YDown => [nx, ny, nz],
+        };
+        let array = |name: &str, shape: &str| {
+            let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
+            let mut bytes = Vec::new();
+            zip.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
+            let (header, data) = bytes.split_at(128);
+            assert!(std::str::from_utf8(&header[10..]).unwrap().contains(shape), "{name}");
+            data.to_vec()
+        };
+        let floats = |data: Vec<u8>| data.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        let shape = format!("({}, {}, {}", dims[0], dims[1], dims[2]);
+        assert!(array("bound.npy", &format!("{shape})")).iter().all(|&b| b == 1));
+        let origin: Vec<f64> =
+            array("origin.npy", "(3,)").as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        Self {
+            lattice,
+            dims: dims.map(|n| n as usize),
+            origin: DVec3::from_slice(&origin),
+            u: floats(array("u.npy", &format!("{shape}, 3)"))),
+            gradients: floats(array("F.npy", &format!("{shape}, 3, 3)"))),
         }
     }
-    let bytes = write_field_npz(&Field::of_values(lattice.clone(), values), DVec3::new(100.0, 0.0, 0.0));
-    let array = |name: &str, shape: &str| {
-        let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
-        let mut bytes = Vec::new();
-        zip.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
-        let (header, data) = bytes.split_at(128);
-        assert!(std::str::from_utf8(&header[10..]).unwrap().contains(shape), "{name}");
-        data.to_vec()
-    };
-    let floats =
-        |data: Vec<u8>| -> Vec<f32> { data.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect() };
-    let shape = format!("({nx}, {ny}, {nz}, 3");
-    let (u, gradients) = (floats(array("u.npy", &shape)), floats(array("F.npy", &format!("{shape}, 3)"))));
+}
+
+/// Origin that is given to the writer, in the axes of the files.
+const FAR: DVec3 = DVec3::new(100.0, -200.0, 300.0);
+
+/// Displacement at a point, with y up.
+fn displacement(p: Vec3) -> Vec3 {
+    Vec3::new(0.1 * p.y, 0.2 * p.z, 0.3 * p.x)
+}
+
+#[test]
+fn field_is_written_with_z_as_the_fastest_axis() {
+    let WrittenField { lattice, dims: [_, ny, nz], origin, u, gradients } = WrittenField::new(UpAxis::Y);
     let (x, y, z) = (1, 2, 3);
     let node = z + nz * (y + ny * x);
-    assert_eq!(u[3 * node..3 * node + 3], by(place(x, y, z)).to_array());
+    let at = lattice.origin + lattice.cell * Vec3::new(1.0, 2.0, 3.0);
+    assert_eq!(u[3 * node..3 * node + 3], displacement(at).to_array());
     // F[i][j] is the change of component i along axis j.
     let expected = [1.0, 0.1, 0.0, 0.0, 1.0, 0.2, 0.3, 0.0, 1.0];
     let close =
         gradients[9 * node..][..9].iter().zip(expected).all(|(a, b): (&f32, f32)| (a - b).abs() < 1e-5);
     assert!(close, "{:?}", &gradients[9 * node..][..9]);
-    let origin: Vec<f64> =
-        array("origin.npy", "(3,)").as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
-    assert_eq!(origin[0], 100.0 + f64::from(lattice.origin.x));
-    assert!(array("bound.npy", &format!("({nx}, {ny}, {nz})")).iter().all(|&b| b == 1));
+    assert_eq!(origin, FAR + lattice.origin.as_dvec3());
+}
+
+/// Tolerance for numbers of at most 10 that were computed in `f32`, object units.
+const FIELD_TOLERANCE: f64 = 1e-5;
+
+/// A file with z up has the point (x, -z, y) where the field has (x, y, z), and one with y down has (x, -y, -z). So the
+/// displacement (0.1 y, 0.2 z, 0.3 x) at a point (a, b, c) of the file is (0.1 c, -0.3 a, -0.2 b) with z up, and
+/// (-0.1 b, 0.2 c, -0.3 a) with y down. Rows of F are the derivatives of these plus the identity.
+#[test]
+fn fields_are_written_in_the_axes_of_the_files() {
+    type OfPoint = fn(DVec3) -> DVec3;
+    let with_z: OfPoint = |p| DVec3::new(0.1 * p.z, -0.3 * p.x, -0.2 * p.y);
+    let with_y_down: OfPoint = |p| DVec3::new(-0.1 * p.y, 0.2 * p.z, -0.3 * p.x);
+    for (up, of_point, expected) in [
+        (UpAxis::Z, with_z, [1.0, 0.0, 0.1, -0.3, 1.0, 0.0, 0.0, -0.2, 1.0]),
+        (UpAxis::YDown, with_y_down, [1.0, -0.1, 0.0, 0.0, 1.0, 0.2, -0.3, 0.0, 1.0]),
+    ] {
+        let WrittenField { lattice, dims: [nx, ny, nz], origin, u, gradients } = WrittenField::new(up);
+        let nodes = (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])));
+        for (node, steps) in nodes.enumerate() {
+            let at = origin - FAR + f64::from(lattice.cell) * DVec3::from(steps.map(|n| n as f64));
+            let u = DVec3::new(u[3 * node].into(), u[3 * node + 1].into(), u[3 * node + 2].into());
+            assert!(u.distance(of_point(at)) < FIELD_TOLERANCE, "{up:?} at {at}: {u}");
+            let rows = &gradients[9 * node..][..9];
+            let close = rows.iter().zip(expected).all(|(&a, b)| (f64::from(a) - b).abs() < FIELD_TOLERANCE);
+            assert!(close, "{up:?} at {at}: {rows:?}");
+        }
+    }
 }
 
 /// The file of [`sample`], deflated as by SciPy, with `change` applied to each array. Arrays for which `change` returns
