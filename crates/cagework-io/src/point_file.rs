@@ -84,7 +84,9 @@ impl PointFile {
     /// Reads a NumPy array `[n, 3]` of 32- or 64-bit floats, or a text file with one point per line. Numbers are
     /// separated by commas, semicolons or blanks, and may be quoted. x, y and z are the first three, or the columns with
     /// these names in a header, which may add a unit (`x [m]`), or those that ParaView calls `Points:0` to `Points:2`.
-    /// Lines before the first point, lines that begin with `#` and empty lines are kept.
+    /// A comment begins with `#` or `//`. It is a header only if it has as many words as the first point, at least
+    /// behind a colon. Without a header, one label may precede the numbers, such as the element of an atom. Lines before
+    /// the first point, comments and empty lines are kept.
     ///
     /// # Errors
     /// [`PointFileError`] if the text or the array is invalid, a coordinate is not finite, there are no points, or the
@@ -111,42 +113,56 @@ impl PointFile {
 
     fn read_text(text: &str, bytes: u64) -> Result<Self, PointFileError> {
         let (mut positions, mut places) = (Vec::new(), Vec::new());
-        let mut columns = [0, 1, 2];
+        // Headers that name x, y and z, and the columns of the coordinates, which the first point decides.
+        let mut headers: Vec<Header> = Vec::new();
+        let mut columns = None;
         // Number of names in a header without x, y and z, and its line.
         let mut unnamed = None;
-        let mut start = 0;
+        // Whether the first line is a number alone: a .xyz file has the number of its atoms there, then a title.
+        let mut starts_with_count = false;
+        let mut end = 0;
         for (number, line) in text.split_inclusive('\n').enumerate() {
+            let start = end;
+            end += line.len();
+            let is_comment = line.trim_start().starts_with('#') || line.trim_start().starts_with("//");
+            if is_comment {
+                if positions.is_empty() {
+                    headers.extend(Header::in_words(line));
+                }
+                continue;
+            }
             let found = words(line);
-            let word = |column: usize| found.get(column).map(|range| &line[range.clone()]);
-            let numbers = columns.map(|c| word(c).and_then(|word| word.parse::<f64>().ok()));
-            if line.contains(';') && line.contains(',') && numbers.iter().any(Option::is_some) {
+            let number_at = |c: usize| found.get(c).and_then(|word| line[word.clone()].parse::<f64>().ok());
+            let is_point = |columns: &[usize; 3]| columns.iter().all(|&c| number_at(c).is_some());
+            let is_number = columns.unwrap_or(FIRST).map(|c| number_at(c).is_some());
+            if line.contains(';') && line.contains(',') && is_number.contains(&true) {
                 return Err(PointFileError::DecimalComma { line: number + 1 });
             }
-            if let [Some(x), Some(y), Some(z)] = numbers {
+            let of_headers = || {
+                let fits = |header: &&Header| header.n_words.is_none_or(|n| n == found.len());
+                let named = headers.iter().rev().filter(fits).map(|header| header.columns);
+                named.chain([FIRST, AFTER_LABEL]).find(is_point)
+            };
+            if let Some(chosen) = columns.or_else(of_headers).filter(is_point) {
                 if let Some((_, line)) = unnamed.filter(|(n, _)| positions.is_empty() && *n == found.len()) {
                     return Err(PointFileError::Header { line });
                 }
-                positions.push(DVec3::new(x, y, z));
-                places.push(columns.map(|c| start + found[c].start..start + found[c].end));
-            } else if positions.is_empty() {
-                let header = line.trim_start_matches(['#', ' ']);
-                let found = words(header);
-                let named = [["x", "points:0"], ["y", "points:1"], ["z", "points:2"]].map(|names| {
-                    found.iter().position(|range| {
-                        let name = header[range.clone()].split([' ', '[', '(']).next();
-                        name.is_some_and(|name| names.iter().any(|n| n.eq_ignore_ascii_case(name)))
-                    })
-                });
-                if let [Some(x), Some(y), Some(z)] = named {
-                    columns = [x, y, z];
-                    unnamed = None;
-                } else if line.contains([',', ';']) && !line.starts_with('#') {
-                    unnamed = Some((found.len(), number + 1));
+                columns = Some(chosen);
+                positions.push(DVec3::from_array(chosen.map(|c| number_at(c).unwrap_or(f64::NAN))));
+                places.push(chosen.map(|c| start + found[c].start..start + found[c].end));
+            } else if !positions.is_empty() {
+                if !found.is_empty() {
+                    return Err(PointFileError::Line { line: number + 1 });
                 }
-            } else if !found.is_empty() && !line.starts_with('#') {
-                return Err(PointFileError::Line { line: number + 1 });
+            } else if number == 1 && starts_with_count {
+                headers.extend(Header::in_words(line));
+            } else if let Some(columns) = named_columns(line, &found) {
+                headers.push(Header { columns, n_words: None });
+                unnamed = None;
+            } else if line.contains([',', ';']) {
+                unnamed = Some((found.len(), number + 1));
             }
-            start += line.len();
+            starts_with_count |= number == 0 && found.len() == 1 && number_at(0).is_some();
         }
         Ok(Self { positions, bytes, source: Source::Text { text: text.to_owned(), places } })
     }
@@ -177,6 +193,41 @@ impl PointFile {
         out += &text[end..];
         out.into_bytes()
     }
+}
+
+/// Columns of the coordinates without a header, and behind a label such as the element of an atom.
+const FIRST: [usize; 3] = [0, 1, 2];
+const AFTER_LABEL: [usize; 3] = [1, 2, 3];
+
+/// A line that names the columns of x, y and z.
+struct Header {
+    columns: [usize; 3],
+    /// Number of words that a line of a point must have for this header to hold; `None` if any number will do.
+    n_words: Option<usize>,
+}
+
+impl Header {
+    /// Finds headers in a comment or a title: its words, or those behind a colon. A sentence can contain x, y and z as
+    /// well, so each point must have as many words as such a header.
+    fn in_words(line: &str) -> impl Iterator<Item = Self> {
+        let line = line.trim_start_matches(['#', '/', ' ', '\t']);
+        let behind_colon = line.split_once(':').map(|(_, names)| names);
+        [Some(line), behind_colon].into_iter().flatten().filter_map(|names| {
+            let found = words(names);
+            Some(Self { columns: named_columns(names, &found)?, n_words: Some(found.len()) })
+        })
+    }
+}
+
+/// Finds the columns whose names are x, y and z among the words of a line.
+fn named_columns(line: &str, words: &[Range<usize>]) -> Option<[usize; 3]> {
+    let column = |names: [&str; 2]| {
+        words.iter().position(|range| {
+            let name = line[range.clone()].split([' ', '[', '(']).next();
+            name.is_some_and(|name| names.iter().any(|n| n.eq_ignore_ascii_case(name)))
+        })
+    };
+    Some([column(["x", "points:0"])?, column(["y", "points:1"])?, column(["z", "points:2"])?])
 }
 
 /// Splits a line into words. A comma or semicolon separates two words, which may be empty; blanks and quotes around a
@@ -223,6 +274,28 @@ mod tests {
             "\"id\",\"Points:0\",\"Points:1\",\"Points:2\"\n0,1.5,2,3\n"
         );
         assert_eq!(moved("\t1\t 2  3 255 0\n"), "\t1.5\t 2  3 255 0\n");
+    }
+
+    /// CloudCompare writes titles behind `//`. The format .xyz of molecules has the number of atoms, a title, and lines of
+    /// an element and three numbers (<https://openbabel.org/docs/FileFormats/XYZ_cartesian_coordinates_format.html>).
+    #[test]
+    fn comments_name_columns_only_if_they_match_the_points() {
+        for (header, before, after) in [
+            ("# Format: x y z r g b", "1 2 3 255 0 0", "1.5 2 3 255 0 0"),
+            ("# Format: t x y z", "9 1 2 3", "9 1.5 2 3"),
+            ("# columns are x y z in m", "1 2 3", "1.5 2 3"),
+            ("# columns are x y z in m", "1 2 3 4 5 6", "1.5 2 3 4 5 6"),
+            ("//X Y Z R G B", "1 2 3 255 0 0", "1.5 2 3 255 0 0"),
+            ("//X,Y,Z,R,G,B", "1,2,3,255,0,0", "1.5,2,3,255,0,0"),
+            ("// t,x,y,z", "9,1,2,3", "9,1.5,2,3"),
+            ("1\nwater", "O 1 2 3", "O 1.5 2 3"),
+            ("1\nC x y z", "C 1 2 3", "C 1.5 2 3"),
+            ("1\ncomment C x y z", "C 1 2 3 0 0 0", "C 1.5 2 3 0 0 0"),
+        ] {
+            // A comment among the points can contain numbers.
+            let rest = "\n  # 7 7 7 7 7 7\n";
+            assert_eq!(moved(&format!("{header}\n{before}{rest}")), format!("{header}\n{after}{rest}"));
+        }
     }
 
     #[test]
