@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::accessor::Source;
-use super::pack::{F32, INDICES, Pack, U16, U32, VERTICES, push, write_glb};
+use super::pack::{F32, INDICES, Pack, U16, U32, VERTICES, each_view, push, write_glb};
 use super::root::{DRACO, MESHOPT, typed};
 use crate::error::WriteError;
 
@@ -74,7 +74,8 @@ struct Elements {
     stride: usize,
 }
 
-/// Makes a GLB smaller. A GLB whose geometry is compressed already is returned unchanged.
+/// Makes a GLB smaller. A GLB whose geometry is compressed already is returned unchanged, as is one that would not become
+/// smaller: the descriptions of streams take space, too.
 ///
 /// # Errors
 /// [`WriteError`] if the GLB cannot be parsed.
@@ -87,13 +88,13 @@ pub fn compact(glb: Vec<u8>, options: CompactOptions) -> Result<Vec<u8>, WriteEr
     if json["extensionsUsed"].as_array().is_some_and(|names| names.iter().any(is_packed)) {
         return Ok(glb);
     }
-    let split = split(&mut json, &bin, options.quantize)?;
-    if options.compress == Compression::None {
-        return Ok(split);
+    let mut small = split(&mut json, &bin, options.quantize)?;
+    if options.compress == Compression::Meshopt {
+        let (mut json, bin) = parts(&small)?;
+        let bin = compress(&mut json, &bin, options.quantize);
+        small = write_glb(&json, &bin)?;
     }
-    let (mut json, bin) = parts(&split)?;
-    let bin = compress(&mut json, &bin, options.quantize);
-    write_glb(&json, &bin)
+    Ok(if small.len() < glb.len() { small } else { glb })
 }
 
 fn damaged(problem: impl std::fmt::Display) -> WriteError {
@@ -177,6 +178,14 @@ fn split(json: &mut Value, bin: &[u8], quantize: bool) -> Result<Vec<u8>, WriteE
     let source = Source { root: &root, buffers: &buffers };
     let before = json.clone();
     let mut pack = Pack::of_bytes(&before, bin);
+    // A view that one accessor alone refers to gets new bytes. Old views of others stay if the document has an unknown
+    // extension, which may refer to them.
+    let mut n_references = vec![0_usize; before["bufferViews"].as_array().map_or(0, Vec::len)];
+    each_view(json, &mut |view| {
+        if let Some(n) = view.as_u64().and_then(|view| n_references.get_mut(view as usize)) {
+            *n += 1;
+        }
+    });
     let mut needs_extension = false;
     let uses = uses(&before);
     let has_more_weights = uses.values().any(|of| matches!(of, Use::Vertex(name, _) if name == "WEIGHTS_1"));
@@ -202,7 +211,14 @@ fn split(json: &mut Value, bin: &[u8], quantize: bool) -> Result<Vec<u8>, WriteE
             Use::Index(_) => Some(INDICES),
             _ => None,
         };
-        let view = pack.push_view(json, bytes, target);
+        let own = of_json["bufferView"].as_u64().map(|view| view as usize);
+        let view = match own.filter(|&view| n_references.get(view) == Some(&1)) {
+            Some(view) => {
+                pack.replace_view(json, view, bytes, target);
+                view
+            }
+            None => pack.push_view(json, bytes, target),
+        };
         if is_vertex && stride != element {
             json["bufferViews"][view]["byteStride"] = stride.into();
         }

@@ -24,7 +24,7 @@ pub const PROJECT_EXTENSION: &str = "CAGEWORK_project";
 
 /// Extensions whose accessor references [`each_accessor`] visits. If a document uses others, unused items are
 /// kept, since renumbering could break unknown references.
-const KNOWN_EXTENSIONS: [&str; 10] = [
+const KNOWN_EXTENSIONS: [&str; 12] = [
     "VRM",
     "KHR_materials_",
     "KHR_texture_",
@@ -34,6 +34,8 @@ const KNOWN_EXTENSIONS: [&str; 10] = [
     "KHR_animation_pointer",
     "KHR_xmp",
     "EXT_mesh_gpu_instancing",
+    "KHR_gaussian_splatting",
+    "FB_ngon_encoding",
     PROJECT_EXTENSION,
 ];
 
@@ -83,6 +85,21 @@ impl<'a> Pack<'a> {
         }
         self.views.push(Some((bytes, 0)));
         push(json, "bufferViews", view)
+    }
+
+    /// Replaces the bytes of a buffer view.
+    pub(super) fn replace_view(
+        &mut self,
+        json: &mut Value,
+        view: usize,
+        bytes: Vec<u8>,
+        target: Option<u32>,
+    ) {
+        json["bufferViews"][view] = json!({ "buffer": 0, "byteLength": bytes.len() });
+        if let Some(target) = target {
+            json["bufferViews"][view]["target"] = target.into();
+        }
+        self.views[view] = Some((bytes.into(), 0));
     }
 
     /// Adds an f32 accessor with `components` numbers per element; `bounds` adds min and max.
@@ -332,7 +349,7 @@ pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
 }
 
 /// Calls `visit` with each reference to a buffer view: members named `bufferView` outside `extras`.
-fn each_view(json: &mut Value, visit: Visit<'_>) {
+pub(super) fn each_view(json: &mut Value, visit: Visit<'_>) {
     match json {
         Value::Object(object) => {
             for (key, value) in object {
