@@ -1,6 +1,8 @@
 //! 3DGS PLY files: logarithms of the scales, logarithm of the opacity's odds, rotation w, x, y, z, and spherical
 //! harmonics by channel. The table of vertices keeps properties that are not read.
 
+use std::ops::Range;
+
 use glam::{DVec3, Quat, Vec3};
 
 use super::{
@@ -70,6 +72,15 @@ impl Kind {
         }
     }
 
+    /// Formats a number in its shortest form.
+    fn text(self, x: f64) -> String {
+        match self {
+            Self::F32 => format!("{:?}", x as f32),
+            Self::F64 => format!("{x:?}"),
+            _ => x.to_string(),
+        }
+    }
+
     /// Encodes a number as little-endian bytes.
     fn put(self, x: f64) -> [u8; 8] {
         let mut bytes = [0; 8];
@@ -88,6 +99,19 @@ impl Kind {
     }
 }
 
+/// Byte ranges of the words of a text from `at` on.
+fn words(text: &[u8], mut at: usize) -> impl Iterator<Item = Range<usize>> {
+    std::iter::from_fn(move || {
+        let start = at + text[at..].iter().position(|b| !b.is_ascii_whitespace())?;
+        at = text[start..].iter().position(u8::is_ascii_whitespace).map_or(text.len(), |n| start + n);
+        Some(start..at)
+    })
+}
+
+fn number(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
 /// A property that the file stores for each vertex, that is, for each splat.
 #[derive(Clone, Debug)]
 struct Column {
@@ -100,8 +124,10 @@ struct Column {
 /// The bytes of a PLY file, and the layout of its vertices.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
-    /// The file. A text file is stored as binary.
+    /// The file. The vertices of a text file are stored as binary.
     bytes: Vec<u8>,
+    /// A text file as read, and the end of its header, bytes.
+    text: Option<(Vec<u8>, usize)>,
     /// Offset of the first vertex, bytes.
     start: usize,
     count: usize,
@@ -245,33 +271,61 @@ impl Table {
         if needed > found || count > u64::from(u32::MAX) {
             return Err(SplatError::Count { count, needed, found });
         }
-        let in_memory = count.saturating_mul(header.stride as u64) + 2 * bytes.len() as u64;
+        let copies = if is_text { 3 } else { 2 };
+        let in_memory = count.saturating_mul(header.stride as u64) + copies * bytes.len() as u64;
         MemoryError::check(in_memory, memory_limit)?;
         let (count, stride) = (count as usize, header.stride);
         let is_big_endian = header.format == "binary_big_endian";
         let columns = header.columns;
         if !is_text {
             let start = header.end + before as usize;
-            return Ok(Self { bytes: bytes.to_vec(), start, count, stride, is_big_endian, columns });
+            return Ok(Self {
+                bytes: bytes.to_vec(),
+                text: None,
+                start,
+                count,
+                stride,
+                is_big_endian,
+                columns,
+            });
         }
-        let lines = header.lines.iter().filter(|line| !line.starts_with("format"));
-        let is_vertex = |line: &&&str| !line.starts_with("element") || line.starts_with("element vertex");
-        // Other elements of a text file are dropped.
-        let lines: Vec<&str> = lines.take_while(is_vertex).copied().collect();
-        let mut table = Self::empty(&lines.join("\n"), columns, count, stride);
-        let text = String::from_utf8_lossy(&bytes[header.end..]);
-        let mut words = text.split_ascii_whitespace();
+        let mut table = Self::empty("", columns, count, stride);
+        let mut words = words(bytes, header.end);
         for vertex in 0..count {
             for column in 0..table.columns.len() {
                 let word = words.next().unwrap_or_default();
-                let number: f64 = word.parse().map_err(|_| {
-                    let word = shown_start(word, MAX_NAME_CHARS);
+                let number = number(&bytes[word.clone()]).ok_or_else(|| {
+                    let word = String::from_utf8_lossy(&bytes[word]);
+                    let word = shown_start(&word, MAX_NAME_CHARS);
                     SplatError::Damaged(format!("splat {vertex}: '{word}' is not a number such as 1.25"))
                 })?;
                 table.put(vertex, column, number);
             }
         }
+        table.text = Some((bytes.to_vec(), header.end));
         Ok(table)
+    }
+
+    /// The file with the numbers of the table. A text file keeps all words whose numbers have not changed, and the
+    /// elements after the vertices.
+    fn into_file(self) -> Vec<u8> {
+        let Some((text, header_end)) = &self.text else { return self.bytes };
+        let (mut out, mut copied) = (Vec::with_capacity(text.len()), 0);
+        let mut words = words(text, *header_end);
+        for vertex in 0..self.count {
+            for (column, Column { kind, .. }) in self.columns.iter().enumerate() {
+                let word = words.next().unwrap_or_default();
+                let [before, now] =
+                    [number(&text[word.clone()]).unwrap_or(f64::NAN), self.get(vertex, column)];
+                if kind.put(before) != kind.put(now) {
+                    out.extend_from_slice(&text[copied..word.start]);
+                    out.extend(kind.text(now).into_bytes());
+                    copied = word.end;
+                }
+            }
+        }
+        out.extend_from_slice(&text[copied..]);
+        out
     }
 
     /// Creates a table of zeros. `lines`: header lines after the format.
@@ -279,7 +333,7 @@ impl Table {
         let mut bytes = format!("ply\nformat binary_little_endian 1.0\n{lines}\nend_header\n").into_bytes();
         let start = bytes.len();
         bytes.resize(start + count * stride, 0);
-        Self { bytes, start, count, stride, is_big_endian: false, columns }
+        Self { bytes, text: None, start, count, stride, is_big_endian: false, columns }
     }
 
     /// Creates a table for new splats. `is_far`: positions need f64.
@@ -405,5 +459,5 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, table: Option<&Table>) -> Vec<
         let at = to_write.position(splat).to_array();
         position.iter().zip(at).for_each(|(&column, x)| table.put(splat, column, x));
     }
-    table.bytes
+    table.into_file()
 }

@@ -89,6 +89,35 @@ fn text_and_big_endian_files_equal_the_binary_one() {
     }
 }
 
+/// A text file stays text: only the words of numbers that changed differ, and other elements are kept.
+#[test]
+fn text_files_keep_their_words_and_elements() {
+    let camera = "element camera 1\nproperty float view_px\nproperty list uchar int ids\n";
+    let mut text = header(NAMES, 6, "ascii").replace("end_header", &format!("{camera}end_header"));
+    for splat in 0..6 {
+        // Zeros at the end of a number are not in its shortest form, so they show that the word is kept.
+        let words: Vec<String> = (0..27).map(|column| format!("{}00", number(splat, column))).collect();
+        text += &format!("{}\r\n", words.join("  "));
+    }
+    text += "1.50 2 7 8\n";
+    let model = read("a.ply", text.as_bytes()).unwrap();
+    let mut moved = model.splats().unwrap().clone();
+    moved.positions[2].x = 0.5;
+    let out = model.write_splats(ModelFormat::Ply, &moved).unwrap();
+    let lines = |text: &str| text.split('\n').map(str::to_owned).collect::<Vec<_>>();
+    let (before, after) = (lines(&text), lines(std::str::from_utf8(&out).unwrap()));
+    let n_header = before.iter().position(|line| line == "end_header").unwrap() + 1;
+    assert_eq!(before.len(), after.len());
+    for line in (0..before.len()).filter(|&line| line != n_header + 2) {
+        assert_eq!(before[line], after[line]);
+    }
+    let [before, after] = [&before, &after].map(|all| all[n_header + 2].split("  ").collect::<Vec<_>>());
+    // A PLY of splats has y down, so its x is that of the model.
+    assert_eq!((after[0], &after[1..19]), ("0.5", &before[1..19]));
+    assert!(after[26].ends_with('\r') && after.len() == 27);
+    assert_eq!(read("a.ply", &out).unwrap().splats().unwrap().positions[2].x, 0.5);
+}
+
 /// Position, scale, colour with opacity, and rotation, as the format lays them out: 3 floats, 3 floats, 4 bytes, 4
 /// bytes.
 #[test]
