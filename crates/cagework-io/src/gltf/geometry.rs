@@ -11,7 +11,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::accessor::Source;
 use super::scene::Instance;
-use super::{GltfDocument, GltfError, Slot, skin};
+use super::{GltfDocument, GltfError, Slot, skin, splats};
 use crate::origin::relative;
 
 pub(crate) struct Geometry {
@@ -45,13 +45,17 @@ pub(crate) fn read(
 ) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
+    let mut n_splats = 0_u64;
     let (mut is_rigged, mut repeated) = (false, Vec::new());
     let mut loose: BTreeMap<u32, usize> = BTreeMap::new();
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let Some((position, mode)) = surface(primitive) else {
-                skipped += 1;
+                match splats::declared(document, instance.mesh, p) {
+                    Some(n) => n_splats = n_splats.saturating_add(n),
+                    None => skipped += 1,
+                }
                 continue;
             };
             let start = geometry.positions.len();
@@ -108,6 +112,13 @@ pub(crate) fn read(
         let others = others(repeated.len());
         notices.push(format!(
         "node {node}{others} draws instances of its mesh (EXT_mesh_gpu_instancing): only one of them is bound"
+        ));
+    }
+    if n_splats > 0 {
+        notices.push(format!(
+            "{} not read and stay where they are, because the file also has triangles: export the splats and the \
+             triangles as two files",
+            counted(n_splats as usize, "splat is", "splats are")
         ));
     }
     if skipped > 0 {

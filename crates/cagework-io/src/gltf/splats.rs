@@ -33,6 +33,13 @@ struct SplatPrimitive<'a> {
     degree: u8,
 }
 
+/// Number of splats of a primitive, which may declare any number; `None` if the primitive is not one of splats.
+pub(super) fn declared(document: &GltfDocument, mesh: u32, primitive: usize) -> Option<u64> {
+    let json = &document.json["meshes"][mesh as usize]["primitives"][primitive];
+    json["extensions"].get(EXTENSION)?;
+    Some(accessor(&json["attributes"], "POSITION").and_then(|of| document.source().count(of)).unwrap_or(0))
+}
+
 fn harmonic(degree: u8, coefficient: usize) -> String {
     format!("{EXTENSION}:SH_DEGREE_{degree}_COEF_{coefficient}")
 }

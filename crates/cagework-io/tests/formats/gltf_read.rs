@@ -267,6 +267,20 @@ fn points_and_lines_are_skipped() {
 }
 
 #[test]
+fn splats_beside_triangles_are_counted() {
+    let mut b = instanced();
+    let splats = b.cube_mesh("splats");
+    b.primitive(splats)["mode"] = 0.into();
+    b.primitive(splats)["extensions"] = json!({ "KHR_gaussian_splatting": { "kernel": "ellipse" } });
+    b.push("nodes", json!({ "mesh": splats }));
+    b.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let model = read_glb(&b);
+    assert_eq!((model.positions.len(), model.notices.len()), (16, 1));
+    let said = model.notices[0].starts_with(&format!("{} splats are not read", cube().len()));
+    assert!(said && model.notices[0].ends_with("as two files"), "{}", model.notices[0]);
+}
+
+#[test]
 fn trailing_bytes_and_missing_bin_padding_are_tolerated() {
     let mut bytes = plain_cube().glb();
     bytes.extend_from_slice(b"trailing");
