@@ -22,9 +22,12 @@ pub enum WriteError {
         /// Vertex index.
         vertex: usize,
     },
-    /// The model has no triangles, which a GLB export needs.
-    #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
-    NoFaces,
+    /// The model has no triangles, which the format needs.
+    #[error("the model has no faces, but {format} needs triangles: export PLY instead, which keeps points")]
+    NoFaces {
+        /// Name of the requested format, such as "GLB".
+        format: &'static str,
+    },
     /// A number of a splat exceeds the largest value that the format can store.
     #[error(
         "splat {splat} has {what} {value}, more than the limit of {limit}: scale the capture, or write another format"

@@ -201,7 +201,7 @@ fn solids<'a>(shape: &Shape<'a>) -> Vec<(&'a str, usize)> {
 pub(crate) fn write(shape: &Shape<'_>) -> Result<Vec<u8>, WriteError> {
     let Shape { positions, origin, triangles, encoding, .. } = shape;
     if triangles.is_empty() {
-        return Err(WriteError::NoFaces);
+        return Err(WriteError::NoFaces { format: "STL" });
     }
     let all = triangles.iter().map(|t| {
         let corners = t.map(|v| positions[v as usize]);

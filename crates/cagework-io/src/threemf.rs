@@ -152,7 +152,7 @@ pub(crate) fn write(shape: &Shape<'_>) -> Result<Vec<u8>, WriteError> {
         n += 1;
     }
     if n == 0 {
-        return Err(WriteError::NoFaces);
+        return Err(WriteError::NoFaces { format: "3MF" });
     }
     text += "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
     package::write_new(&[

@@ -140,7 +140,7 @@ pub fn write_mesh_glb(
     rig: Option<&Rig>,
 ) -> Result<Vec<u8>, WriteError> {
     if mesh.triangles.is_empty() {
-        return Err(WriteError::NoFaces);
+        return Err(WriteError::NoFaces { format: "GLB" });
     }
     let mut json = json!({
         "asset": { "version": "2.0", "generator": "Cagework" },

@@ -278,7 +278,7 @@ impl Model {
         self.check(base)?;
         poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
         if self.triangles.is_empty() {
-            return Err(WriteError::NoFaces);
+            return Err(WriteError::NoFaces { format: "GLB" });
         }
         let at_rest = self.positions_in_file();
         let base = self.up.turned_back(base);

@@ -283,7 +283,14 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     before.positions = expected;
     assert!((volume(&before) - volume(&again)).abs() < 1e-5);
     let no_faces = read("p.obj", b"v 0 0 0").unwrap();
-    assert!(no_faces.write_glb(&no_faces.positions).unwrap_err().to_string().contains("no faces"));
+    for (format, name) in
+        [(ModelFormat::Gltf, "GLB"), (ModelFormat::Stl, "STL"), (ModelFormat::ThreeMf, "3MF")]
+    {
+        let message = no_faces.write(format, &no_faces.positions).unwrap_err().to_string();
+        let expected = format!("no faces, but {name} needs triangles: export PLY");
+        assert!(message.contains(&expected), "{message}");
+    }
+    assert!(no_faces.write(ModelFormat::Ply, &no_faces.positions).is_ok());
 }
 
 /// GLB exports of several poses keep colours, textures and opacity of materials, and vertex colours.
