@@ -77,6 +77,15 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
             hint: "leave out --smooth",
         });
     }
+    if is_capture {
+        let why = "splats and points have no rig, and no parts, and each moves by itself";
+        args.rig.refuse(true, why, "leave it out: only meshes with faces take it")?;
+    }
+    if args.lattice.is_some() {
+        let why = "a lattice covers the space in the cage and has no rig and no parts";
+        let hint = "leave it out, or write the model and the lattice in two runs";
+        args.rig.refuse(args.output.is_none(), why, hint)?;
+    }
     let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;
     match (&args.output, &args.weights, &lattice) {
         (Some(output), _, _) if is_capture => {

@@ -115,6 +115,27 @@ impl RigArgs {
         Ok(())
     }
 
+    /// Rejects the options of rigs and parts for a deformation that cannot follow them, such as that of points.
+    /// `of_rig`: also rejects options that only change skeletons and clips. `why`: the reason, as a sentence.
+    ///
+    /// # Errors
+    /// If such an option is given.
+    pub(crate) fn refuse(&self, of_rig: bool, why: &str, hint: &'static str) -> Result<(), CliError> {
+        let given = [
+            ("--ground", self.ground),
+            ("--rigid", !self.parts.rigid.is_empty()),
+            ("--mask", !self.parts.mask.is_empty()),
+            ("--joints", of_rig && self.joints != Joints::default()),
+            ("--feet", of_rig && self.feet != Feet::default()),
+            ("--keep-travel", of_rig && self.keep_travel),
+            ("--static", of_rig && self.shape_only),
+        ];
+        match given.iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(CliError::Mismatch { message: format!("{option}: {why}"), hint }),
+            None => Ok(()),
+        }
+    }
+
     /// Whether `--joints stay` leaves the skeleton at rest.
     pub(crate) fn stays(&self) -> bool {
         self.joints == Joints::Stay

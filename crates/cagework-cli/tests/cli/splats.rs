@@ -65,6 +65,42 @@ fn splats_turn_with_the_cage_and_stay_far_outside() {
     refused("bind a.splat --cage box.obj --weights a.npz", "no faces");
 }
 
+/// Options for rigs and parts would be without effect on splats and points, and on a lattice.
+#[test]
+fn options_of_rigs_are_refused_for_splats_points_and_lattices() {
+    let sandbox = sandbox();
+    sandbox.write("cloud.ply", cloud());
+    let all = [
+        "--ground",
+        "--rigid all",
+        "--mask all=0.5",
+        "--joints stay",
+        "--feet lock",
+        "--keep-travel",
+        "--static",
+    ];
+    let cage = "--cage box.obj --pose pose.obj";
+    for option in all {
+        let name = option.split(' ').next().unwrap();
+        for file in ["a.splat", "cloud.ply"] {
+            sandbox
+                .run(&format!("deform {file} {cage} {option} -o out.ply"))
+                .code(1)
+                .stderr(contains(format!("{name}: splats and points have no rig")));
+        }
+        sandbox
+            .run(&format!("deform box.obj {cage} {option} --lattice out.npz"))
+            .code(1)
+            .stderr(contains(format!("{name}: a lattice covers")));
+    }
+    // The model of the same run could follow these, but the lattice could not.
+    for option in ["--ground", "--rigid all", "--mask all"] {
+        let both = format!("deform box.obj {cage} {option} --weights w.npz -o out.obj --lattice out.npz");
+        sandbox.run(&both).code(1).stderr(contains("a lattice covers"));
+    }
+    assert!(!sandbox.names().iter().any(|name| name.starts_with("out")));
+}
+
 /// The centres of [`capture`] that are not far outside, as a PLY without faces.
 pub(crate) fn cloud() -> String {
     let capture = capture();
