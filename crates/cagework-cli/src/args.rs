@@ -107,7 +107,7 @@ pub(crate) struct InfoArgs {
     cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's algorithm)")]
 pub(crate) struct BindArgs {
     /// Mesh to bind.
-    #[arg(help = model_help("Mesh to bind"))]
+    #[arg(help = mesh_help("Mesh to bind"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -268,7 +268,7 @@ pub(crate) struct PullArgs {
     Examples:\n  cagework bench\n  cagework bench horse.obj --cage cage.obj -g 32,64,128 --runs 5 --json")]
 pub(crate) struct BenchArgs {
     /// Mesh to bind.
-    #[arg(requires = "cage", help = model_help("Mesh to bind"))]
+    #[arg(requires = "cage", help = mesh_help("Mesh to bind"))]
     pub(crate) mesh: Option<PathBuf>,
     /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE", requires = "mesh")]
@@ -332,8 +332,18 @@ impl FromStr for ModelOutput {
 
 /// Composes the help text of a model argument: `what`, followed by the supported file extensions.
 fn model_help(what: &str) -> String {
-    let endings = ModelFormat::ALL.map(|format| format.facts().endings).concat().join(", .");
-    format!("{what} (.{endings})")
+    help_with_endings(what, |_| true)
+}
+
+/// Composes the help text of an argument for a model with faces.
+fn mesh_help(what: &str) -> String {
+    help_with_endings(what, ModelFormat::holds_faces)
+}
+
+fn help_with_endings(what: &str, is_read: impl Fn(ModelFormat) -> bool) -> String {
+    let formats = ModelFormat::ALL.into_iter().filter(|format| is_read(*format));
+    let endings: Vec<&str> = formats.flat_map(|format| format.facts().endings).copied().collect();
+    format!("{what} (.{})", endings.join(", ."))
 }
 
 /// Returns a parser of an option whose value is one word of a fixed set.

@@ -6,6 +6,7 @@ use cagework_cage::CageOptions;
 use cagework_cage::generate::{BOX_MARGIN, CageReport, generate};
 use cagework_cage::samples::{self, Sample};
 use cagework_core::cage::MAX_FACES;
+use cagework_core::words::counted;
 use cagework_core::{
     Bounds, Cage, CageError, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh, subdivided_box,
 };
@@ -37,6 +38,16 @@ pub(crate) struct LoadedCage {
 /// If the file cannot be read, has no faces, or needs more memory than the limit.
 pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let model = load_any(path, up, memory)?;
+    if let Some(splats) = model.splats() {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{}: has {} but no faces",
+                shown_path(path),
+                counted(splats.len(), "splat", "splats")
+            ),
+            hint: "`cagework deform` moves splats with a cage, without weights; this command takes meshes",
+        });
+    }
     model.require_faces()?;
     Ok(model)
 }

@@ -97,7 +97,7 @@ impl CageArgs {
     cagework check cage.obj --mesh horse.glb --repair grow -o grown.obj")]
 pub(crate) struct CheckArgs {
     /// Cage to check.
-    #[arg(help = super::model_help("Cage to check"))]
+    #[arg(help = super::mesh_help("Cage to check"))]
     pub(crate) cage: PathBuf,
     /// Model that should be inside the cage.
     #[arg(long, value_name = "FILE")]

@@ -19,7 +19,7 @@ use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs, number};
 )]
 pub(crate) struct RefitArgs {
     /// Models inside the cage, and folders of models.
-    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models inside the cage, and folders of models"))]
+    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::mesh_help("Models inside the cage, and folders of models"))]
     pub(crate) models: Vec<PathBuf>,
     /// Text file with more models, one name per line; empty lines and lines that start with # are ignored.
     #[arg(long, value_name = "FILE")]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ReadArgs, glb_output, model_help};
+use super::{ReadArgs, glb_output, mesh_help};
 
 /// Arguments of `cagework transfer`.
 #[derive(Args, Debug)]
@@ -16,7 +16,7 @@ use super::{ReadArgs, glb_output, model_help};
 pub(crate) struct TransferArgs {
     /// Body with a skeleton or morph targets (.glb, .gltf, .vrm).
     pub(crate) body: PathBuf,
-    #[arg(help = model_help("Clothes, to get a skeleton without one of their own"))]
+    #[arg(help = mesh_help("Clothes, to get a skeleton without one of their own"))]
     pub(crate) clothes: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,

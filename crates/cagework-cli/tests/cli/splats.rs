@@ -62,7 +62,8 @@ fn splats_turn_with_the_cage_and_stay_far_outside() {
     refused(&format!("{deform} --weights a.npz"), "is deformed without weights");
     refused(&format!("{deform} --pose box.obj"), "take one pose, but 2 were given");
     refused("map a.splat --cage box.obj --pose box.obj -o b.splat", "leave their shapes");
-    refused("bind a.splat --cage box.obj --weights a.npz", "no faces");
+    refused("bind a.splat --cage box.obj --weights a.npz", "a.splat: has 3,000 splats but no faces");
+    refused("refit a.splat --cage box.obj --pose pose.obj -o out", "`cagework deform` moves splats");
 }
 
 /// Options for rigs and parts would be without effect on splats and points, and on a lattice.

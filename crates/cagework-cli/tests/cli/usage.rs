@@ -15,6 +15,32 @@ fn version_and_help_succeed() {
     }
 }
 
+/// Commands that need faces do not list the formats that only have splats.
+#[test]
+fn help_lists_the_formats_that_a_command_takes() {
+    let sandbox = Sandbox::new();
+    for (command, takes_splats) in [
+        ("bind", false),
+        ("refit", false),
+        ("transfer", false),
+        ("check", false),
+        ("bench", false),
+        ("deform", true),
+        ("pull", true),
+        ("info", true),
+        ("cage", true),
+        ("render", true),
+    ] {
+        let splats = contains(".splat, .spz");
+        let help = sandbox.run(&format!("{command} --help")).success().stdout(contains(".stl"));
+        if takes_splats {
+            help.stdout(splats)
+        } else {
+            help.stdout(splats.not())
+        };
+    }
+}
+
 #[test]
 fn invalid_command_line_exits_with_2() {
     let sandbox = Sandbox::with_sphere_in_box();
