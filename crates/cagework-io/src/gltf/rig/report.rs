@@ -1,6 +1,6 @@
 //! Report about the reshaping of a document.
 
-use cagework_core::words::{counted, decimals};
+use cagework_core::words::{counted, decimals, three_digits};
 use serde::Serialize;
 
 use super::ground::Ground;
@@ -99,10 +99,14 @@ impl ReshapeReport {
             ),
         );
         if self.lift != 0.0 {
-            notice(1, format!("lifted by {} to stand at the same height", decimals(self.lift, 4)));
+            let moved = if self.lift > 0.0 { "lifted" } else { "lowered" };
+            notice(
+                1,
+                format!("{moved} by {} to stand at the same height", three_digits(self.lift.abs() as f32)),
+            );
         }
         let n = self.clip_lifts.iter().filter(|lift| **lift != 0.0).count();
-        let most = decimals(self.clip_lifts.iter().map(|lift| lift.abs()).fold(0.0, f64::max), 4);
+        let most = three_digits(self.clip_lifts.iter().map(|lift| lift.abs()).fold(0.0, f64::max) as f32);
         let clips = counted(self.clip_lifts.len(), "clip", "clips");
         notice(
             n,
@@ -139,5 +143,19 @@ impl ReshapeReport {
             ),
         );
         notices
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ReshapeReport;
+
+    #[test]
+    fn small_lifts_have_three_significant_digits() {
+        let report =
+            ReshapeReport { lift: -0.001_234_5, clip_lifts: vec![0.0, -0.000_02], ..Default::default() };
+        let all = report.notices().join("\n");
+        assert!(all.contains("lowered by 0.00123 to stand"), "{all}");
+        assert!(all.contains("lifted or lowered 1 of 2 clips by up to 0.0000200,"), "{all}");
     }
 }
