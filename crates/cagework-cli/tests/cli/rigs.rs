@@ -209,9 +209,9 @@ fn poses_are_morph_targets_with_the_given_names() {
 #[test]
 fn poses_become_expressions_of_a_vrm() {
     let sandbox = bound();
-    let vrm_1 = json!({ "specVersion": "1.0", "expressions": { "preset": { "aa": {} }, "custom": 3 } });
+    let vrm_1 = json!({ "specVersion": "1.0", "expressions": { "preset": { "aa": { "morphTargetBinds": [{ "node": 0, "index": 0, "weight": 1.0 }] } }, "custom": 3 } });
     sandbox.write("one.vrm", with_extensions(&sandbox, &json!({ "VRMC_vrm": vrm_1 })));
-    let vrm_0 = json!({ "blendShapeMaster": { "blendShapeGroups": [{ "name": "A", "presetName": "a" }] } });
+    let vrm_0 = json!({ "blendShapeMaster": { "blendShapeGroups": [{ "name": "A", "presetName": "a", "binds": [{ "mesh": 0, "index": 0, "weight": 100.0 }] }] } });
     sandbox.write("zero.vrm", with_extensions(&sandbox, &json!({ "VRM": vrm_0 })));
     let node = glb_json(&sandbox.read("humanoid.glb"))["nodes"]
         .as_array()
@@ -232,7 +232,7 @@ fn poses_become_expressions_of_a_vrm() {
     assert_eq!(expressions["preset"]["happy"]["morphTargetBinds"], binds(0));
     assert_eq!(expressions["custom"]["smirk"]["morphTargetBinds"], binds(1));
     assert_eq!(expressions["custom"]["still"]["morphTargetBinds"], json!([]), "it moves nothing");
-    assert_eq!(expressions["preset"]["aa"], json!({}));
+    assert_eq!(expressions["preset"]["aa"]["morphTargetBinds"][0]["index"], 0, "unchanged");
     assert_eq!(json["animations"].as_array().unwrap().len(), 1, "the model's own clip alone");
     let info = sandbox.json("info out.vrm --json");
     assert_eq!(info["vrm"]["version"], "1.0");
@@ -267,6 +267,48 @@ fn poses_become_expressions_of_a_vrm() {
         .run(&format!("{} --times 0.5", deform("one.vrm", one)))
         .success()
         .stdout(contains("1 pose as VRM expressions (Joy) and an animation of 0.5 s"));
+}
+
+/// Exporters write presets that are not used as expressions without morph targets. Both specifications allow empty
+/// lists, and an application finds the expression by its preset.
+#[test]
+fn expressions_that_do_nothing_are_filled() {
+    let sandbox = bound();
+    let happy = json!({ "isBinary": true, "morphTargetBinds": [], "overrideBlink": "block" });
+    let colors =
+        json!({ "materialColorBinds": [{ "material": 0, "type": "color", "targetValue": [1, 1, 1, 1] }] });
+    let vrm_1 =
+        json!({ "specVersion": "1.0", "expressions": { "preset": { "happy": happy, "sad": colors } } });
+    sandbox.write("one.vrm", with_extensions(&sandbox, &json!({ "VRMC_vrm": vrm_1 })));
+    let groups = json!([
+        { "name": "Smile", "presetName": "Joy", "binds": [], "materialValues": [] },
+        { "name": "Sorrow", "presetName": "sorrow", "binds": [], "materialValues": [{ "materialName": "a" }] },
+    ]);
+    let vrm_0 = json!({ "blendShapeMaster": { "blendShapeGroups": groups } });
+    sandbox.write("zero.vrm", with_extensions(&sandbox, &json!({ "VRM": vrm_0 })));
+    let deform = |model: &str, name: &str| {
+        sandbox.run(&format!(
+            "deform {model} --cage cage.obj --weights w.npz --expression --pose wide.obj --name {name} -o out.vrm"
+        ))
+    };
+    deform("one.vrm", "happy").success();
+    let expressions = &glb_json(&sandbox.read("out.vrm"))["extensions"]["VRMC_vrm"]["expressions"];
+    let happy = &expressions["preset"]["happy"];
+    assert_eq!((&happy["isBinary"], &happy["overrideBlink"]), (&json!(true), &json!("block")), "kept");
+    assert_eq!(
+        (&happy["morphTargetBinds"][0]["index"], &happy["morphTargetBinds"][0]["weight"]),
+        (&json!(0), &json!(1.0))
+    );
+    deform("zero.vrm", "joy").success();
+    let groups =
+        &glb_json(&sandbox.read("out.vrm"))["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"];
+    let bind = json!([{ "mesh": 0, "index": 0, "weight": 100.0 }]);
+    assert_eq!((groups.as_array().unwrap().len(), &groups[0]["name"]), (2, &json!("Smile")));
+    assert_eq!((&groups[0]["presetName"], &groups[0]["binds"]), (&json!("Joy"), &bind));
+    for (model, name) in [("one.vrm", "sad"), ("zero.vrm", "sorrow")] {
+        let message = format!("the file has an expression '{name}' already");
+        deform(model, name).code(1).stderr(contains(message));
+    }
 }
 
 #[test]

@@ -114,10 +114,11 @@ fn groups(json: &Value) -> impl Iterator<Item = &Value> {
     groups.as_array().into_iter().flatten()
 }
 
-/// Adds an expression for each pose.
+/// Adds an expression for each pose. If the document has an expression with this name that does nothing, as exporters
+/// write for presets that are not used, it is filled instead.
 ///
 /// # Errors
-/// If the document is not a VRM, or has an expression with this name.
+/// If the document is not a VRM, or has an expression with this name that does something.
 pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result<(), WriteError> {
     let is_1 = json.pointer("/extensions/VRMC_vrm").is_some_and(Value::is_object);
     if !is_1 && !json.pointer("/extensions/VRM").is_some_and(Value::is_object) {
@@ -131,33 +132,69 @@ pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result
         known.extend(groups(json).filter_map(|group| preset_0(group["presetName"].as_str()?)));
     }
     for (name, targets) in poses {
-        if !known.insert(key(name)) {
+        let is_new = known.insert(key(name));
+        let of_group = |group: &Value| {
+            let preset = group["presetName"].as_str().and_then(preset_0);
+            group["name"].as_str().map(key).as_ref() == Some(&key(name)) || preset == Some(key(name))
+        };
+        let existing = if is_1 { expressions_1(json, name) } else { groups_0(json, of_group) };
+        let is_free = !existing.is_empty() && existing.iter().all(|expression| is_idle(expression));
+        if !is_new && !is_free {
             return Err(WriteError::Document(format!(
                 "the file has an expression '{}' already: give the pose another name",
                 shown(name)
             )));
         }
-        if is_1 {
-            let binds: Vec<Value> =
-                targets.iter().map(|t| json!({ "node": t.node, "index": t.target, "weight": 1.0 })).collect();
+        let (list, binds) = binds(targets, is_1);
+        if let Some(existing) = existing.into_iter().next() {
+            existing[list] = binds;
+        } else if is_1 {
             let kind = if PRESETS_1.contains(name) { "preset" } else { "custom" };
-            let expression = json!({ "isBinary": false, "morphTargetBinds": binds });
             let of_kind = object(object(&mut json["extensions"]["VRMC_vrm"], "expressions"), kind);
-            of_kind[*name] = expression;
+            of_kind[*name] = json!({ "isBinary": false, list: binds });
         } else {
-            let meshes: BTreeSet<(usize, usize)> = targets.iter().map(|t| (t.mesh, t.target)).collect();
-            let binds: Vec<Value> = meshes
-                .iter()
-                .map(|(mesh, target)| json!({ "mesh": mesh, "index": target, "weight": 100.0 }))
-                .collect();
             let preset = preset_0(name).unwrap_or_else(|| "unknown".into());
             let group = json!({
-                "name": name, "presetName": preset, "binds": binds, "materialValues": [], "isBinary": false,
+                "name": name, "presetName": preset, list: binds, "materialValues": [], "isBinary": false,
             });
             push(object(&mut json["extensions"]["VRM"], "blendShapeMaster"), "blendShapeGroups", group);
         }
     }
     Ok(())
+}
+
+/// The list of morph targets of an expression: its name in VRM 1 or 0, and the targets of a pose at full weight.
+fn binds(targets: &[PoseTarget], is_1: bool) -> (&'static str, Value) {
+    if is_1 {
+        let of_target = |t: &PoseTarget| json!({ "node": t.node, "index": t.target, "weight": 1.0 });
+        return ("morphTargetBinds", targets.iter().map(of_target).collect());
+    }
+    let meshes: BTreeSet<(usize, usize)> = targets.iter().map(|t| (t.mesh, t.target)).collect();
+    let of_mesh = |(mesh, target)| json!({ "mesh": mesh, "index": target, "weight": 100.0 });
+    ("binds", meshes.into_iter().map(of_mesh).collect())
+}
+
+/// The expressions of VRM 1 with this name.
+fn expressions_1<'v>(json: &'v mut Value, name: &str) -> Vec<&'v mut Value> {
+    let kinds = json.pointer_mut("/extensions/VRMC_vrm/expressions").and_then(Value::as_object_mut);
+    let kinds = kinds.into_iter().flat_map(|kinds| kinds.iter_mut());
+    let kinds = kinds.filter(|(kind, _)| ["preset", "custom"].contains(&kind.as_str()));
+    kinds.filter_map(|(_, all)| all.get_mut(name)).collect()
+}
+
+/// The expressions of VRM 0 that `is` selects.
+fn groups_0(json: &mut Value, is: impl Fn(&Value) -> bool) -> Vec<&mut Value> {
+    let groups = json.pointer_mut("/extensions/VRM/blendShapeMaster/blendShapeGroups");
+    let groups = groups.and_then(Value::as_array_mut).into_iter().flatten();
+    groups.filter(|group| is(group)).collect()
+}
+
+/// Whether an expression has no effect: it is an object without morph targets and changes of materials.
+fn is_idle(expression: &Value) -> bool {
+    let lists =
+        ["morphTargetBinds", "materialColorBinds", "textureTransformBinds", "binds", "materialValues"];
+    let is_empty = |list: &Value| list.is_null() || list.as_array().is_some_and(Vec::is_empty);
+    expression.is_object() && lists.iter().all(|list| is_empty(&expression[*list]))
 }
 
 /// Returns the object under a key. Replaces a value that is not an object by an empty object.
