@@ -76,6 +76,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         };
         write(&output.path, &bytes)?;
         binding.report.notices.extend(model.lost_in(output.format));
+        binding.report.notices.extend(model.copies_in(output.format, &bytes));
     }
     save_cage(args, cage, &model)?;
     let report = json(&binding.report);

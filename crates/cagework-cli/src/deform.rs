@@ -198,6 +198,7 @@ fn deform(
     let (bytes, rig) = deformation.into_file(model, &poses.names, output_file, &options)?;
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
+    notices.extend(model.copies_in(format, &bytes));
     write(output, &args.size.apply(bytes, output)?)?;
 
     let summary = DeformSummary {

@@ -83,6 +83,7 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
         let bytes = export(&model, &mapped.points, &output)?;
         let mut notices = model.notices.clone();
         notices.extend(model.lost_in(output.format));
+        notices.extend(model.copies_in(output.format, &bytes));
         (bytes, mapped, field.lattice, notices)
     };
     if let [first, ..] = mapped.not_found[..] {

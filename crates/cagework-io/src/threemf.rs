@@ -3,7 +3,8 @@
 //!
 //! Reading creates the vertices of an object once for each placement of the object in the build. An export replaces
 //! changed coordinates in the text of the model parts. If placements of one object have different shapes, it writes a
-//! copy of the object for each additional shape. All other files of the archive are copied byte for byte.
+//! copy of the object for each additional shape. Shapes that differ by rounding only are one. All other files of the
+//! archive are copied byte for byte.
 
 mod package;
 mod part;
@@ -61,6 +62,12 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         read.notices.push(format!("it has more than {MAX_MATERIALS} colours: the others are not shown"));
     }
     Ok(read)
+}
+
+/// Number of objects in all model parts of an archive that can be read; 0 for others.
+pub(crate) fn n_objects(bytes: &[u8]) -> usize {
+    Scene::read(bytes, u64::MAX)
+        .map_or(0, |scene| scene.parts.iter().map(|(_, part)| part.objects.len()).sum())
 }
 
 /// Materials in use, in order of first use.

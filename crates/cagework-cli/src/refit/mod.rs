@@ -428,6 +428,7 @@ impl DeformedModel<'_> {
     fn write(self, names: &[String], size: SizeArgs) -> Outcome {
         let Self { job, model, deformation, options, mut report, started } = self;
         let encoded = deformation.into_file(&model, names, &job.output, &options).and_then(|(bytes, rig)| {
+            report.notices.extend(model.copies_in(job.output.format, &bytes));
             write(&job.output.path, &size.apply(bytes, &job.output.path)?)?;
             Ok(rig)
         });

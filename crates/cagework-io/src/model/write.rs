@@ -8,6 +8,7 @@ use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
 use cagework_core::field::{Field, bend_vertices};
 use cagework_core::splats::Splats;
+use cagework_core::words::counted;
 use glam::{DVec3, Quat, Vec3};
 
 use super::format::ModelProperty;
@@ -18,6 +19,7 @@ use crate::look::srgb_from_linear;
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
 use crate::splats::{self, Capture, MAX_COLOR, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
+use crate::threemf;
 use crate::timeline::Timeline;
 use crate::up::UpAxis;
 
@@ -181,6 +183,24 @@ impl Model {
         let lost: Vec<&str> = all.into_iter().filter_map(|(is_lost, what)| is_lost.then_some(what)).collect();
         (!lost.is_empty())
             .then(|| format!("the {} file does not keep: {}", format.export_extension(), lost.join(", ")))
+    }
+
+    /// Returns a sentence about the copies of objects in `written`, an export to `format`; `None` without copies. An
+    /// object of a 3MF that is placed several times is copied if its placements take different shapes.
+    #[must_use]
+    pub fn copies_in(&self, format: ModelFormat, written: &[u8]) -> Option<String> {
+        let Document::Obj(document) = &self.document else { return None };
+        if [self.format, format] != [ModelFormat::ThreeMf; 2] || *document.bytes == *written {
+            return None;
+        }
+        let n = threemf::n_objects(written).saturating_sub(threemf::n_objects(&document.bytes));
+        (n > 0).then(|| {
+            format!(
+                "{} written, because placements of one object take different shapes: settings of a slicer for the \
+                 object apply to its first shape only",
+                counted(n, "copy of an object is", "copies of objects are")
+            )
+        })
     }
 
     /// Exports the model with new positions as an OBJ file.

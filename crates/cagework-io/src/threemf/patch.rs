@@ -8,6 +8,7 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 
 use super::package::Package;
+use super::part::Object;
 use super::scene::{Key, Scene};
 use super::xml::{attributes, span_of};
 use crate::error::WriteError;
@@ -16,14 +17,34 @@ use crate::polygons::{PolygonsError, Shape};
 /// Limit on the text of a part with the copies of its objects, bytes.
 const MAX_PART_BYTES: u64 = 1 << 30;
 
+/// Rounding error of a deformed coordinate, as a fraction of the largest coordinate of its object in the build. Positions
+/// have 24 bits, and so do the weights whose sum moves them. On a plate with 16 placements of a sphere up to 210 mm from
+/// the origin, the shapes by one shift and by one stretch differed by 1.8 units of the last bit, 2^-23 of 210 mm.
+const ROUNDING: f64 = 4.0 / 8_388_608.0;
+
+/// Number of shapes of an object with which a placement is compared. A file can have 131,072 placements, so the number of
+/// comparisons must not be its square.
+const MAX_COMPARED: usize = 1000;
+
 /// A shape of an object: new positions of its vertices in its own space, and identifiers of its components.
-///
-/// A position is `None` if the vertex did not move. Numbers are stored as bits, so that variants can be hashed.
-#[derive(Clone, PartialEq, Eq, Hash)]
 struct Variant {
     object: Key,
-    positions: Vec<Option<[u64; 3]>>,
+    id: u32,
+    /// `None` if the vertex did not move.
+    positions: Vec<Option<DVec3>>,
+    /// Largest rounding error of a position, in the object's own space.
+    rounding: f64,
     components: Vec<u32>,
+}
+
+impl Variant {
+    /// Whether two shapes of an object differ by rounding only.
+    fn is_like(&self, other: &Self, object: &Object) -> bool {
+        let most = self.rounding + other.rounding;
+        let at = |of: &Self, v: usize| of.positions[v].unwrap_or(object.vertices[v]);
+        let near = |v| (at(self, v) - at(other, v)).abs().max_element() <= most;
+        self.components == other.components && (0..self.positions.len()).all(near)
+    }
 }
 
 /// Shapes of all objects, in order of first use.
@@ -31,8 +52,7 @@ struct Variants<'a> {
     scene: &'a Scene,
     rest: &'a [Vec3],
     shape: &'a Shape<'a>,
-    /// Identifier of each shape. The first shape of an object keeps the object's identifier.
-    ids: HashMap<Variant, u32>,
+    /// Shapes of each object. The first one keeps the object's identifier.
     of_object: HashMap<Key, Vec<Variant>>,
     /// Largest identifier in any part. New identifiers are unique across parts, because some programs confuse objects
     /// of different parts with equal identifiers.
@@ -56,7 +76,6 @@ pub(crate) fn patch(bytes: &[u8], rest: &[Vec3], shape: &Shape<'_>) -> Result<Ve
         scene: &scene,
         rest,
         shape,
-        ids: HashMap::new(),
         of_object: HashMap::new(),
         last_id: scene.parts.iter().map(|(_, part)| part.last_id).max().unwrap_or(0),
         vertex: 0,
@@ -111,36 +130,36 @@ impl Variants<'_> {
             components.push(self.add(target, transform * component.transform)?);
         }
         let inverse = transform.inverse();
+        let mut largest = 0.0_f64;
         let positions = (self.vertex..self.vertex + object.vertices.len()).map(|v| {
             let new = self.shape.positions[v];
             if new == self.rest[v] {
                 return Ok(None);
             }
-            let place = inverse.transform_point3(self.shape.origin + new.as_dvec3());
+            let world = self.shape.origin + new.as_dvec3();
+            let place = inverse.transform_point3(world);
+            largest = largest.max(f64::from(new.abs().max_element()));
             let is_finite = place.as_vec3().is_finite();
-            if is_finite {
-                Ok(Some(place.to_array().map(f64::to_bits)))
-            } else {
-                Err(WriteError::NotFinite { vertex: v })
-            }
+            if is_finite { Ok(Some(place)) } else { Err(WriteError::NotFinite { vertex: v }) }
         });
         let positions = positions.collect::<Result<_, _>>()?;
-        let variant = Variant { object: key, positions, components };
         self.vertex += object.vertices.len();
-        if let Some(&id) = self.ids.get(&variant) {
-            return Ok(id);
-        }
+        // Largest factor by which the inverse stretches an error along an axis.
+        let stretch = inverse.matrix3.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let rounding = ROUNDING * largest * stretch;
+        let mut variant = Variant { object: key, id: object.id, positions, rounding, components };
         let known = self.of_object.entry(key).or_default();
-        let id = if known.is_empty() {
-            object.id
-        } else {
+        if let Some(same) = known.iter().take(MAX_COMPARED).find(|known| known.is_like(&variant, object)) {
+            return Ok(same.id);
+        }
+        if !known.is_empty() {
             self.last_id = self.last_id.checked_add(1).ok_or_else(|| {
                 WriteError::Document("no identifier is left for the copy of an object".into())
             })?;
-            self.last_id
-        };
-        known.push(variant.clone());
-        self.ids.insert(variant, id);
+            variant.id = self.last_id;
+        }
+        let id = variant.id;
+        known.push(variant);
         Ok(id)
     }
 }
@@ -151,8 +170,7 @@ fn object_text(text: &str, variants: &Variants<'_>, variant: &Variant, copy: usi
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
     let components = object.components.iter().zip(&variant.components);
     edits.extend(components.map(|(component, id)| (component.id_span.clone(), id.to_string())));
-    let number = |bits: u64| {
-        let x = f64::from_bits(bits);
+    let number = |x: f64| {
         if variants.shape.origin == DVec3::ZERO { (x as f32).to_string() } else { x.to_string() }
     };
     let mut reader = Reader::from_str(&text[object.span.clone()]);
@@ -177,7 +195,7 @@ fn object_text(text: &str, variants: &Variants<'_>, variant: &Variant, copy: usi
             let axis = ["x", "y", "z"].iter().position(|&axis| axis == key);
             let replacement = match (axis, new) {
                 (Some(axis), Some(new)) => number(new[axis]),
-                _ if copy > 0 && name == "object" && key == "id" => variants.ids[variant].to_string(),
+                _ if copy > 0 && name == "object" && key == "id" => variant.id.to_string(),
                 _ if copy > 0 && key.ends_with(":UUID") => other_uuid(value, copy),
                 _ => continue,
             };

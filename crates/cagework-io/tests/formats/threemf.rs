@@ -110,11 +110,50 @@ fn objects_with_several_shapes_are_copied() {
             .iter()
             .all(|n| count(&format!("p:UUID=\"00000002-61cb-4c03-9d28-80fed5dfa1d{:x}\"", n + 10)) == 1)
     );
+    let notice = model.copies_in(ModelFormat::ThreeMf, &written).unwrap();
+    assert!(notice.starts_with("4 copies of objects are written"), "{notice}");
     // Placements with the same motion share one object.
     let shifted: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::Z).collect();
     let written = model.write(ModelFormat::ThreeMf, &shifted).unwrap();
     let root = text(&written, ROOT);
     assert_eq!(root.matches("<object ").count(), 2, "{root}");
+    assert_eq!(model.copies_in(ModelFormat::ThreeMf, &written), None);
+}
+
+/// Placed coordinates are rounded to 24 bits, so the same shift gives slightly different shapes of one object: 0.1 has an
+/// error of 2^-28 near the origin, and of 2^-18 at 128 mm.
+#[test]
+fn placements_that_differ_by_rounding_share_an_object() {
+    let corners = ["0.1 0.2 0.3", "10.1 0.7 0", "0.3 9.7 0", "0.9 0.7 5.3"].map(|corner| {
+        let [x, y, z] = <[&str; 3]>::try_from(corner.split(' ').collect::<Vec<_>>()).unwrap();
+        format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")
+    });
+    let triangles = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+        .map(|[a, b, c]| format!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>"));
+    let mesh = format!(
+        "<mesh><vertices>{}</vertices><triangles>{}</triangles></mesh>",
+        corners.concat(),
+        triangles.concat()
+    );
+    let items = ["0 0 0", "33.3 0 0", "0 129.7 0.1", "200.9 180.3 0"]
+        .map(|at| format!("<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 {at}\"/>"));
+    let part = model_part(&format!("<object id=\"1\" type=\"model\">{mesh}</object>"), &items.concat());
+    let model = read("a.3mf", &package(&[(ROOT, part)])).unwrap();
+    let n_objects = |positions: &[Vec3]| {
+        let written = model.write(ModelFormat::ThreeMf, positions).unwrap();
+        let again = read("b.3mf", &written).unwrap();
+        assert!(again.positions.iter().zip(positions).all(|(p, q)| p.distance(*q) < ROUNDING));
+        text(&written, ROOT).matches("<object ").count()
+    };
+    // Positions in f32, moved by sums of weights that have errors of their own.
+    let shift = Vec3::new(0.123, -4.567, 8.9);
+    let by_weights = |p: &Vec3| (*p + 7.7) * 0.3 + (*p - 1.1) * 0.7 - Vec3::splat(1.54) + shift;
+    let shifted: Vec<Vec3> = model.positions.iter().map(by_weights).collect();
+    assert_eq!(n_objects(&shifted), 1);
+    // A motion of a tenth of a millimetre is none of these errors.
+    let mut bent = shifted;
+    bent[5].z += 0.1;
+    assert_eq!(n_objects(&bent), 2);
 }
 
 #[test]

@@ -135,9 +135,11 @@ impl Engine {
         };
         let (bytes, lost) = self.read(|state| {
             let model = &state.models().get(id)?.model;
-            Answer::Ok((model.write(format, state.models().get(id)?.share(&posed))?, model.lost_in(format)))
+            let bytes = model.write(format, state.models().get(id)?.share(&posed))?;
+            let lost = [model.lost_in(format), model.copies_in(format, &bytes)];
+            Answer::Ok((bytes, lost.into_iter().flatten().collect()))
         })?;
-        self.state.borrow_mut().rig_notices = lost.into_iter().collect();
+        self.state.borrow_mut().rig_notices = lost;
         Ok(bytes)
     }
 
