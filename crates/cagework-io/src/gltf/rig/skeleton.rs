@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::mesh::Semantic;
-use glam::DVec3;
+use cagework_core::rotation::nearest_rotation;
+use glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::Rig;
@@ -11,11 +12,17 @@ use super::ground::Ground;
 use super::nodes::{Deformation, NamedMoves, NodeMove, holders};
 use crate::gltf::GltfDocument;
 use crate::gltf::geometry::attribute;
-use crate::gltf::scene::name_of;
+use crate::gltf::scene::{Worlds, name_of};
 use crate::gltf::skin::each_influence;
 
 /// Two skeletons are equally large if the ratio of their sizes differs from 1 by at most this.
 const MAX_SAME_SCALE: f64 = 0.01;
+
+/// Two frames are equal if the components of their unit axes differ by at most this: files store rotations in f32.
+const MAX_SAME_FRAME: f64 = 1e-6;
+
+/// Largest distance of the unit vectors along a bone in two files, about 10 degrees: files of one rig differ less.
+const MAX_SAME_BONE: f64 = 0.17;
 
 /// Displacements of joints by their names, for files that share a rig.
 ///
@@ -24,11 +31,23 @@ const MAX_SAME_SCALE: f64 = 0.01;
 pub struct Skeleton {
     /// Joints that carry vertices in one of the files.
     holds: BTreeSet<String>,
-    /// For each joint of the body, the file whose deformation all files share: world position at rest, and move.
-    moves: BTreeMap<String, (DVec3, NodeMove)>,
+    /// Joints of the body, the file whose deformation all files share, by name.
+    moves: BTreeMap<String, BodyJoint>,
     /// Lowest points of the body or of all files, which determine how far every file is lifted. Displacements in
     /// `moves` include this lift.
     pub(super) ground: Option<Ground>,
+}
+
+/// A joint of the body.
+#[derive(Clone, Debug, PartialEq)]
+struct BodyJoint {
+    /// World position at rest.
+    at: DVec3,
+    /// Linear part of the world transform at rest.
+    linear: DMat3,
+    /// Name of the nearest joint above; `None` without one.
+    parent: Option<String>,
+    moves: NodeMove,
 }
 
 impl Skeleton {
@@ -97,19 +116,28 @@ impl Rig<'_> {
         json: &mut Value,
     ) -> Skeleton {
         let moved = self.moved(given, json);
+        let above = nearest(&self.worlds, &self.following(None));
         let mut skeleton = Skeleton { ground, ..joints_with_vertices(self.document) };
         // Of several nodes with the same name, the first one defines the moves: list joints first.
         let follows = self.follows.iter().map(|&(node, _)| node as usize);
         for node in holders(self.document).into_iter().chain(follows) {
-            let from = self.worlds.world[node].w_axis.truncate();
-            let name = bare(&self.node_name(node as u32)).to_owned();
-            skeleton.moves.entry(name).or_insert((from, moved.moves[node]));
+            let world = self.worlds.world[node];
+            let name = |node: usize| bare(&self.node_name(node as u32)).to_owned();
+            skeleton.moves.entry(name(node)).or_insert_with(|| BodyJoint {
+                at: world.w_axis.truncate(),
+                linear: DMat3::from_mat4(world),
+                parent: above[node].map(name),
+                moves: moved.moves[node],
+            });
         }
         skeleton
     }
 
     /// Looks up the moves of this document's nodes by their names. Displacements are scaled by the ratio of the sizes
     /// of the two skeletons, measured over their common joints.
+    ///
+    /// A file of clips can have another rest pose than the body. A joint then moves relative to the joint above as in
+    /// the body, but in the frame of that joint at rest, so that its bone gets the length of the body's bone.
     pub(super) fn named(&self, skeleton: &Skeleton) -> NamedMoves {
         let names: Vec<String> =
             (0..self.held.len() as u32).map(|node| bare(&self.node_name(node)).to_owned()).collect();
@@ -122,31 +150,118 @@ impl Rig<'_> {
                 found.entry(&names[node]).or_insert(node);
             }
         }
+        let mut is_found = vec![false; names.len()];
+        found.values().for_each(|&node| is_found[node] = true);
+        let above = nearest(&self.worlds, &is_found);
+        // The joint above each joint that has the same name in both files.
+        let parent = |node: usize| {
+            let body = skeleton.moves.get(&names[node])?;
+            above[node].filter(|&above| body.parent.as_deref() == Some(names[above].as_str()))
+        };
         let own = |node: usize| self.worlds.world[node].w_axis.truncate();
         let size = |points: &[DVec3]| {
             let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
             let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
             (high - low).length()
         };
-        let sizes = [
-            size(&found.values().map(|&node| own(node)).collect::<Vec<_>>()),
-            size(&found.keys().map(|&name| skeleton.moves[name].0).collect::<Vec<_>>()),
-        ];
-        let scale = Some(sizes[0] / sizes[1])
+        // The median ratio of bones does not depend on the rest poses. Without bones, the boxes of the joints are compared.
+        let of_bone = |&node: &usize| {
+            let (above, body) = (parent(node)?, |node: usize| skeleton.moves[&names[node]].at);
+            let [mine, others] = [own(node).distance(own(above)), body(node).distance(body(above))];
+            (mine > 0.0 && others > 0.0).then_some(mine / others)
+        };
+        let mut bones: Vec<f64> = found.values().filter_map(of_bone).collect();
+        bones.sort_by(f64::total_cmp);
+        let of_boxes = || {
+            size(&found.values().map(|&node| own(node)).collect::<Vec<_>>())
+                / size(&found.keys().map(|&name| skeleton.moves[name].at).collect::<Vec<_>>())
+        };
+        let scale = Some(bones.get(bones.len() / 2).copied().unwrap_or_else(of_boxes))
             .filter(|scale| scale.is_finite() && *scale > 0.0 && (scale - 1.0).abs() > MAX_SAME_SCALE)
             .unwrap_or(1.0);
         let mut of_nodes = vec![None; names.len()];
-        for (name, node) in found {
-            let (_, body) = skeleton.moves[name];
-            of_nodes[node] = Some(NodeMove { by: scale * body.by, ..body });
+        let turned = self.frame_changes(&names, skeleton, &is_found, parent);
+        // Whether the move of each node is that of the body, without a change by the rest pose.
+        let mut is_plain = vec![true; names.len()];
+        for node in self.worlds.order.iter().map(|&(node, _)| node as usize).filter(|&node| is_found[node]) {
+            let body = &skeleton.moves[&names[node]];
+            let mut own = NodeMove { by: scale * body.moves.by, ..body.moves };
+            if let Some(turn) = turned[node] {
+                own.turn = turn * own.turn * turn.transpose();
+            }
+            if let Some(above) = parent(node)
+                && let Some(NodeMove { by, .. }) = of_nodes[above]
+            {
+                is_plain[node] = is_plain[above] && turned[above].is_none();
+                if !is_plain[node] {
+                    let relative = body.moves.by - skeleton.moves[&names[above]].moves.by;
+                    own.by = by + scale * (turned[above].unwrap_or(DMat3::IDENTITY) * relative);
+                }
+            }
+            of_nodes[node] = Some(own);
         }
         let holds = names.iter().map(|name| skeleton.holds(name)).collect();
         NamedMoves { of_nodes, holds }
     }
 
+    /// Rotation of each joint at rest from the body to this document; `None` if it has the same frame in both. Programs
+    /// give bones different axes, so a rotation counts only if it takes the bones below the joint from the body to this
+    /// document. `parent`: the joint above a joint, if it has the same name in both files.
+    fn frame_changes(
+        &self,
+        names: &[String],
+        skeleton: &Skeleton,
+        is_found: &[bool],
+        parent: impl Fn(usize) -> Option<usize>,
+    ) -> Vec<Option<DMat3>> {
+        let world = |node: usize| self.worlds.world[node];
+        let body = |node: usize| &skeleton.moves[&names[node]];
+        let change = |node: usize| {
+            is_found[node].then(|| frame_change(DMat3::from_mat4(world(node)), body(node).linear)).flatten()
+        };
+        let mut changes: Vec<Option<DMat3>> = (0..names.len()).map(change).collect();
+        let (mut has_bone, mut fits) = (vec![false; names.len()], vec![true; names.len()]);
+        for node in (0..names.len()).filter(|&node| is_found[node]) {
+            let Some(above) = parent(node) else { continue };
+            let own = (world(node).w_axis - world(above).w_axis).truncate().normalize_or_zero();
+            let of_body = (body(node).at - body(above).at).normalize_or_zero();
+            has_bone[above] = true;
+            fits[above] &= own.distance(changes[above].unwrap_or(DMat3::IDENTITY) * of_body) <= MAX_SAME_BONE;
+        }
+        for node in self.worlds.order.iter().map(|&(node, _)| node as usize).filter(|&node| is_found[node]) {
+            if !has_bone[node] {
+                fits[node] = parent(node).is_none_or(|above| fits[above]);
+            }
+        }
+        changes.iter_mut().zip(fits).filter(|(_, fits)| !fits).for_each(|(change, _)| *change = None);
+        changes
+    }
+
     fn node_name(&self, node: u32) -> String {
         name_of(&self.document.json, "nodes", node, "node")
     }
+}
+
+/// For each node, the nearest node above it that is one of `joints`.
+fn nearest(worlds: &Worlds, joints: &[bool]) -> Vec<Option<usize>> {
+    let mut above = vec![None; joints.len()];
+    for &(node, parent) in &worlds.order {
+        let parent = parent.map(|parent| parent as usize);
+        above[node as usize] = parent.and_then(|p| if joints[p] { Some(p) } else { above[p] });
+    }
+    above
+}
+
+/// Rotation from the frame of a joint at rest in one file to its frame in another; `None` if the frames are equal. Scales
+/// are left out, because they are in the ratio of the sizes.
+fn frame_change(to: DMat3, from: DMat3) -> Option<DMat3> {
+    let normalized = |m: DMat3| {
+        DMat3::from_cols_array_2d(
+            &[m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.normalize_or_zero().to_array()),
+        )
+    };
+    let [to, from] = [to, from].map(normalized);
+    (!to.abs_diff_eq(from, MAX_SAME_FRAME)).then(|| nearest_rotation(to * from.transpose()))
 }
 
 #[cfg(test)]

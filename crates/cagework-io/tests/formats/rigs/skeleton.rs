@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use cagework_io::{Joints, Model, ReshapeOptions};
+use cagework_cage::samples;
+use cagework_io::{Joints, Model, ReshapeOptions, write_mesh_glb};
 use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::json;
 
-use super::{ROUNDING_TOLERANCE, assert_near, f, player, read};
-use crate::common::rigged;
+use super::{ROUNDING_TOLERANCE, assert_near, by, f, player, read};
+use crate::common::{self, json_of, rigged};
 
 /// Tolerance for joints that turn. The gradient of a deformation that moves points of f32 has an error of about 3e-6.
 const TURN_TOLERANCE: f32 = 2e-5;
@@ -56,6 +57,109 @@ fn joints_without_tracks_follow_the_body() {
         let [_, after, body] = origins((tracks, 0.0), Joints::Follow, f);
         assert_near(&after, &body, ROUNDING_TOLERANCE, "first key, which is the rest pose");
     }
+}
+
+/// Key of the clip at which the file of clips is at rest, and tolerance for lengths of bones, m.
+const KEY: usize = 20;
+const LENGTH_TOLERANCE: f32 = 1e-4;
+
+/// Many exporters write the pose of the current frame as the rest pose of a file of clips. Rotations do not change the
+/// length of a bone, so in each frame a bone is as long as in the deformed body.
+#[test]
+fn bones_have_the_lengths_of_the_body_whatever_the_rest_pose() {
+    let sample = samples::build("humanoid").unwrap();
+    let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
+    let body = read(&glb);
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let (mut json, bin) = (json_of(&glb), &glb[28 + length..]);
+    let joints: Vec<usize> = json["skins"][0]["joints"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|joint| joint.as_u64().unwrap() as usize)
+        .collect();
+    let children = |node: usize| json["nodes"][node]["children"].as_array().into_iter().flatten();
+    let bones: Vec<(usize, usize)> = joints
+        .iter()
+        .flat_map(|&node| children(node).map(move |child| (node, child.as_u64().unwrap() as usize)))
+        .filter(|(_, child)| joints.contains(child))
+        .collect();
+    assert!(bones.len() > 10);
+    let animation = json["animations"][0].clone();
+    for channel in animation["channels"].as_array().unwrap() {
+        let path = channel["target"]["path"].as_str().unwrap();
+        let n = if path == "rotation" { 4 } else { 3 };
+        let sampler = &animation["samplers"][channel["sampler"].as_u64().unwrap() as usize];
+        let accessor = &json["accessors"][sampler["output"].as_u64().unwrap() as usize];
+        let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+        let start = view["byteOffset"].as_u64().unwrap_or(0) as usize + 4 * n * KEY;
+        let key: Vec<f32> =
+            bin[start..start + 4 * n].as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        json["nodes"][channel["target"]["node"].as_u64().unwrap() as usize][path] = json!(key);
+    }
+    let file = json.as_object_mut().unwrap();
+    ["meshes", "skins"].into_iter().for_each(|key| drop(file.shift_remove(key)));
+    for node in file["nodes"].as_array_mut().unwrap() {
+        let node = node.as_object_mut().unwrap();
+        ["mesh", "skin"].into_iter().for_each(|key| drop(node.shift_remove(key)));
+    }
+    let clips = |bytes: Vec<u8>| Model::read_with_clips("walk.glb", bytes, &mut |_| None, u64::MAX).unwrap();
+    let clip = clips(common::glb(&json, Some(bin)));
+    for joints in [Joints::Follow, Joints::Turn] {
+        let mut options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+        let (of_body, _) = body.write_reshaped(&by(&body), &[], &[], &options).unwrap();
+        options.skeleton = Some(Arc::new(body.skeleton(&by(&body), &[], &options).unwrap()));
+        let still = vec![DVec3::ZERO; clip.extra_points().unwrap().len()];
+        let (of_clip, _) = clip.write_reshaped(&still, &[], &[], &options).unwrap();
+        let (of_body, of_clip) = (read(&of_body), clips(of_clip));
+        for seconds in [0.0, 0.3, 0.9] {
+            let origins = |model: &Model| player(model).at(Some(0), seconds, &[]).origins;
+            let (in_body, in_clip, before) = (origins(&of_body), origins(&of_clip), origins(&body));
+            for &(a, b) in &bones {
+                let [expected, found, old] =
+                    [&in_body, &in_clip, &before].map(|origins| origins[a].distance(origins[b]));
+                let off = (found - expected).abs();
+                assert!(
+                    off < LENGTH_TOLERANCE,
+                    "{joints:?} {a} {b}: {found} instead of {expected}, before {old}"
+                );
+            }
+        }
+    }
+}
+
+/// Programs give bones different axes. If the positions of the joints are those of the body, the joints move as in the
+/// body.
+#[test]
+fn axes_of_bones_do_not_change_where_joints_move() {
+    let (body, mut rig) = (read(&rigged().glb()), rigged());
+    let file = rig.json.as_object_mut().unwrap();
+    ["meshes", "skins", "animations"].into_iter().for_each(|key| drop(file.shift_remove(key)));
+    rig.json["nodes"][4] = json!({ "name": "bar" });
+    // "root" turns by 90 degrees about z, which takes x to y. Its bone leads along its own x now, and "middle" turns back.
+    let turn = std::f32::consts::FRAC_1_SQRT_2;
+    rig.json["nodes"][1]["rotation"] = json!([0.0, 0.0, turn, turn]);
+    rig.json["nodes"][2]["translation"] = json!([0.5, 0.0, 0.0]);
+    rig.json["nodes"][2]["rotation"] = json!([0.0, 0.0, -turn, turn]);
+    let times = rig.accessor(&common::floats(&[0.0, 1.0]), common::F32, 2, "SCALAR");
+    let turns =
+        rig.accessor(&common::floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]), common::F32, 2, "VEC4");
+    rig.push(
+        "animations",
+        json!({
+            "samplers": [{ "input": times, "output": turns }],
+            "channels": [{ "sampler": 0, "target": { "node": 3, "path": "rotation" } }],
+        }),
+    );
+    let clips = |bytes| Model::read_with_clips("walk.glb", bytes, &mut |_| None, u64::MAX).unwrap();
+    let clip = clips(rig.glb());
+    let mut options = ReshapeOptions::default();
+    let (of_body, _) = body.write_reshaped(&by(&body), &[], &[], &options).unwrap();
+    options.skeleton = Some(Arc::new(body.skeleton(&by(&body), &[], &options).unwrap()));
+    let still = vec![DVec3::ZERO; clip.extra_points().unwrap().len()];
+    let (of_clip, _) = clip.write_reshaped(&still, &[], &[], &options).unwrap();
+    let at_rest = |model: &Model| player(model).at(None, 0.0, &[]).origins[1..4].to_vec();
+    assert_near(&at_rest(&clips(of_clip)), &at_rest(&read(&of_body)), ROUNDING_TOLERANCE, "at rest");
 }
 
 #[test]
