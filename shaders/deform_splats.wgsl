@@ -4,7 +4,8 @@
 //
 // A splat has three rows: its centre and 0, or FLOATER for a floater; the entries xx, xy, xz, yy of its covariance; and
 // the entries yz, zz. A posed splat also has a turn, a vector: its x and y follow zz, and its z is added to the fourth
-// entry of the centre. The turn is 0 at rest, and without spherical harmonics, which need it.
+// entry of the centre. MIRROR is added to its x if the splat is mirrored; the turn is then that of -F. The turn is 0 at
+// rest, and without spherical harmonics, which need it.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> rest: array<vec4f>;
@@ -12,16 +13,18 @@
 
 /// Value of `Work::mode`: also compute the turns.
 const ROTATIONS = 1u;
+/// Added to the first entry of the turn of a mirrored splat.
+const MIRROR: f32 = 4.0;
 /// Number of Newton steps. Five suffice if the singular values are within a factor of 10 of each other; the other five
 /// are for stronger deformations.
 const STEPS = 10u;
 
 /// Finds the orthogonal matrix nearest to `f` by Newton's method on R = (R + R^-T) / 2 (Higham 1986, "Computing the
-/// polar decomposition"). Returns the identity if `f` has no positive determinant. CPU: cagework_core::splats::turn_of.
+/// polar decomposition"). Returns the identity if the determinant of `f` is 0. CPU: cagework_core::splats::turn_of.
 fn turn_of(f: mat3x3f) -> mat3x3f {
     let size = determinant(f);
-    if size <= 0.0 { return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0); }
-    var r = pow(size, -1.0 / 3.0) * f;
+    if size == 0.0 { return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0); }
+    var r = pow(abs(size), -1.0 / 3.0) * f;
     for (var k = 0u; k < STEPS; k += 1u) {
         let cofactors = mat3x3f(cross(r[1], r[2]), cross(r[2], r[0]), cross(r[0], r[1]));
         r = 0.5 * (r + (1.0 / determinant(r)) * cofactors);
@@ -94,7 +97,11 @@ fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
     let bent = f * covariance * transpose(f);
     var turn = vec3f(0.0);
-    if work.mode == ROTATIONS { turn = turn_vector(turn_of(f)); }
+    if work.mode == ROTATIONS {
+        let by_mirror = determinant(f) < 0.0;
+        turn = turn_vector(select(1.0, -1.0, by_mirror) * turn_of(f));
+        if by_mirror { turn.x += MIRROR; }
+    }
     splats[3u * splat] = vec4f(center.xyz + by, center.w + turn.z);
     splats[3u * splat + 1u] = vec4f(bent[0], bent[1].y);
     splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, turn.xy);

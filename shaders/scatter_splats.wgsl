@@ -18,6 +18,8 @@
 
 /// Fourth entry of a floater's centre; turns add a number between -1 and 1, see deform_splats.wgsl.
 const FLOATER: f32 = 4.0;
+/// Added to the first entry of the turn of a mirrored splat, see deform_splats.wgsl.
+const MIRROR: f32 = 4.0;
 
 /// Coefficient `k` of the splat whose coefficients start at word `first`.
 fn coefficient(first: u32, k: u32) -> f32 {
@@ -33,12 +35,14 @@ fn color_of(splat: u32) -> u32 {
     let center = splats[3u * splat];
     let direction = normalize(depths.viewer.w * center.xyz - depths.viewer.xyz);
     let turn_z = center.w - select(0.0, FLOATER, is_floater(splat));
-    let turn = vec3f(splats[3u * splat + 2u].zw, turn_z);
+    let turn_xy = splats[3u * splat + 2u].zw;
+    let is_mirrored = turn_xy.x > 0.5 * MIRROR;
+    let turn = vec3f(turn_xy.x - select(0.0, MIRROR, is_mirrored), turn_xy.y, turn_z);
     // The inverse of the rotation whose axis times tan(angle / 4) is `turn`.
     let size = dot(turn, turn);
     let across = cross(turn, direction);
     let back = (8.0 * cross(turn, across) - 4.0 * (1.0 - size) * across) / ((1.0 + size) * (1.0 + size));
-    var basis = harmonic_basis(direction + back);
+    var basis = harmonic_basis(select(1.0, -1.0, is_mirrored) * (direction + back));
     let n = (depths.degree + 1u) * (depths.degree + 1u);
     let first = splat * ((3u * n + 1u) / 2u);
     var color = vec3f(0.0);

@@ -234,10 +234,14 @@ impl Splats {
     }
 }
 
-/// Rotation of a splat, and of its spherical harmonics, in a deformation with this gradient.
+/// Orthogonal matrix that turns the spherical harmonics of a splat in a deformation with this gradient: the orthogonal
+/// factor of its polar decomposition. Where the deformation mirrors, it is a rotation times -1, so that colours are seen
+/// from mirrored directions.
 #[must_use]
 pub fn turn_of(gradient: Mat3) -> Mat3 {
-    nearest_rotation(gradient.as_dmat3()).as_mat3()
+    let gradient = gradient.as_dmat3();
+    let sign = if gradient.determinant() < 0.0 { -1.0 } else { 1.0 };
+    (sign * nearest_rotation(sign * gradient)).as_mat3()
 }
 
 /// Colour, sRGB, of a splat that is seen along a unit vector from the eye, in the axes of its spherical harmonics.

@@ -7,7 +7,7 @@ use cagework_core::stencil;
 use cagework_gpu::kernels::{self, ALL, Binding, Kernel};
 use cagework_gpu::layout::{Work, mode};
 use cagework_gpu::render::shaders::ALL as DRAWN;
-use cagework_gpu::splats::{BINS, Depths, FLOATER};
+use cagework_gpu::splats::{BINS, Depths, FLOATER, MIRROR};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
 
@@ -132,6 +132,8 @@ fn constants_equal_those_of_rust() {
     same(&kernels::COUNT_SPLATS, "BINS", f64::from(BINS));
     same(&kernels::DEFORM_SPLATS, "ROTATIONS", f64::from(mode::ROTATIONS));
     same(&kernels::SCATTER_SPLATS, "FLOATER", f64::from(FLOATER));
+    same(&kernels::DEFORM_SPLATS, "MIRROR", f64::from(MIRROR));
+    same(&kernels::SCATTER_SPLATS, "MIRROR", f64::from(MIRROR));
     same(&kernels::COUNT_SPLATS, "LOWER_DIGIT", f64::from(mode::LOWER_DIGIT));
     let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_CENTRE", centre);

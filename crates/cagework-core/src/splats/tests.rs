@@ -107,6 +107,26 @@ fn rotation_of_the_cage_equals_rotation_of_the_capture() {
     }
 }
 
+/// A mirrored splat has, in direction d, the colour of the original in the mirrored direction.
+#[test]
+fn mirrored_splats_have_mirrored_colours() {
+    // Covariances: relative to the largest entry. Colours: full intensity is 1.
+    const TOLERANCE: f32 = 1e-4;
+    let mirror = Mat3::from_diagonal(Vec3::new(-1.0, 1.0, 1.0));
+    let splats = splats(100);
+    let deformed = splats.deformed(&field_of(|p| mirror * p));
+    for splat in 0..splats.len() {
+        let expected = splat_covariance(mirror * splats.axes(splat));
+        assert!(error(&splat_covariance(deformed.axes(splat)), &expected) <= TOLERANCE);
+        for k in 0..100 {
+            let d = Quat::from_rotation_y(k as f32) * Quat::from_rotation_x(0.37 * k as f32) * Vec3::Z;
+            let found = color_along(Vec3::ZERO, deformed.harmonics_of(splat), d);
+            let expected = color_along(Vec3::ZERO, splats.harmonics_of(splat), mirror * d);
+            assert!((found - expected).abs().max_element() <= TOLERANCE, "{splat} {d}: {found} {expected}");
+        }
+    }
+}
+
 #[test]
 fn rest_pose_keeps_every_bit() {
     let (field, splats) = (field_of(|p| p), splats(1000));

@@ -8,8 +8,10 @@ use cagework_core::team::Team;
 use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
 use cagework_gpu::kernels;
 use cagework_gpu::skin::field_table;
-use cagework_gpu::splats::{BINS, Depths, FLOATER, sort_splats, splat_colors, splat_harmonics, splat_rows};
-use glam::{Quat, UVec3, Vec3};
+use cagework_gpu::splats::{
+    BINS, Depths, FLOATER, MIRROR, sort_splats, splat_colors, splat_harmonics, splat_rows,
+};
+use glam::{Mat3, Quat, UVec3, Vec3};
 
 use super::support::{Rng, assert_close, egg};
 use super::{ROWS, Work, bytes, mode, run};
@@ -60,16 +62,21 @@ fn deform_splats_matches_cpu() {
     // gradients are near 1 and change by at most about 1 per cell; the tolerance leaves a margin.
     let mut expected = splat_rows(&expected, &[]);
     for (row, &p) in expected.iter_mut().zip(&splats.positions) {
-        set_turn(row, Quat::from_mat3(&turn_of(field.gradient(p))));
+        set_turn(row, turn_of(field.gradient(p)));
     }
     assert_close(&result, expected.as_flattened(), 4e-6);
 }
 
-/// Writes a rotation into the rows of a splat as a vector: its axis times tan(angle / 4).
-fn set_turn(row: &mut [f32; 12], turn: Quat) {
-    let (axis, angle) = turn.to_axis_angle();
+/// Writes an orthogonal matrix into the rows of a splat as a vector: the axis of its rotation times tan(angle / 4). The
+/// rotation of a matrix that mirrors is that of its negative.
+fn set_turn(row: &mut [f32; 12], turn: Mat3) {
+    let sign = turn.determinant().signum();
+    let turn = Quat::from_mat3(&(sign * turn));
+    // Of the two quaternions of the rotation, the one with an angle of at most 180 degrees.
+    let (axis, angle) = if turn.w < 0.0 { -turn } else { turn }.to_axis_angle();
     let turn = axis * (0.25 * angle).tan();
-    (row[3], row[10], row[11]) = (row[3] + turn.z, turn.x, turn.y);
+    let mirror = if sign < 0.0 { MIRROR } else { 0.0 };
+    (row[3], row[10], row[11]) = (row[3] + turn.z, turn.x + mirror, turn.y);
 }
 
 /// Each branch of the kernel's conversion is tested: rotations above 120 degrees have a negative trace.
@@ -78,8 +85,9 @@ fn splats_turn_with_a_rotation() {
     let mut rng = Rng(29);
     let work = Work { mode: mode::ROTATIONS, ..ROWS };
     for axis in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_ONE.normalize(), Vec3::new(0.6, -0.64, 0.48)] {
-        for angle in [0.0, 1.0, 2.2, 3.1] {
-            let turn = Quat::from_axis_angle(axis, angle);
+        for (angle, sign) in [0.0, 1.0, 2.2, 3.1].into_iter().flat_map(|angle| [(angle, 1.0), (angle, -1.0)])
+        {
+            let turn = sign * Mat3::from_quat(Quat::from_axis_angle(axis, angle));
             let lattice = lattice();
             let (from, size) = (lattice.origin, lattice.cell * (lattice.dims - 1).as_vec3());
             let [nx, ny, nz] = lattice.dims.to_array();
@@ -95,7 +103,7 @@ fn splats_turn_with_a_rotation() {
                 set_turn(&mut expected, turn);
                 let error = [3, 10, 11].map(|k| row[k] - expected[k] - if k == 3 { FLOATER } else { 0.0 });
                 // Displacements are rounded to 1e-7, and divided by a cell of a thirtieth of the lattice.
-                assert!(error.iter().all(|e| e.abs() < 1e-5), "{axis}, {angle}: {error:?}");
+                assert!(error.iter().all(|e| e.abs() < 1e-5), "{axis}, {angle}, {sign}: {error:?}");
             }
         }
     }
@@ -123,7 +131,10 @@ fn seen_colours_match_cpu() {
         // Every third splat is a floater.
         let floaters: Vec<f32> = (0..n).map(|k| if k % 3 == 0 { FLOATER } else { 0.0 }).collect();
         let (mut rows, colors) = (splat_rows(&splats.rest_pose(), &floaters), splat_colors(&splats));
-        rows.iter_mut().zip(&splats.rotations).for_each(|(row, &turn)| set_turn(row, turn));
+        // Every second splat is mirrored.
+        let sign = |splat: usize| if splat.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let turn = |splat: usize| sign(splat) * Mat3::from_quat(splats.rotations[splat]);
+        rows.iter_mut().enumerate().for_each(|(splat, row)| set_turn(row, turn(splat)));
         let (places, empty) = (vec![0_u32; BINS as usize], vec![[0_u32; 2]; n]);
         let work = Work { mode: mode::LOWER_DIGIT, ..ROWS };
         let depths = bytes(std::slice::from_ref(&depths));
@@ -132,7 +143,7 @@ fn seen_colours_match_cpu() {
         let seen = run(&kernels::SCATTER_SPLATS, work, 1, &inputs);
         for (splat, entry) in seen.as_chunks::<2>().0.iter().enumerate() {
             assert_eq!(entry[0].to_bits() as usize, splat);
-            let direction = splats.rotations[splat].inverse() * (Vec3::ONE - eye).normalize();
+            let direction = turn(splat).transpose() * (Vec3::ONE - eye).normalize();
             let expected = color_along(splats.colors[splat], splats.harmonics_of(splat), direction);
             let [r, g, b, _] = entry[1].to_bits().to_le_bytes().map(|byte| f32::from(byte) / 255.0);
             let error = (Vec3::new(r, g, b) - expected.clamp(Vec3::ZERO, Vec3::ONE)).abs().max_element();

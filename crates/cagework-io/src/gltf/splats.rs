@@ -1,7 +1,7 @@
 //! Gaussian splats in glTF: point primitives with the extension KHR_gaussian_splatting. Scales and opacities are
 //! linear, rotations x, y, z, w.
 
-use cagework_core::splats::{decompose, n_harmonics, rotate_harmonics};
+use cagework_core::splats::{decompose, n_harmonics, rotate_harmonics, turn_of};
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 use serde_json::{Value, json};
 
@@ -146,7 +146,7 @@ impl SplatPrimitive<'_> {
         }
         let linear = DMat3::from_mat4(self.world).as_mat3();
         if linear != Mat3::IDENTITY {
-            let turn = cagework_core::rotation::nearest_rotation(linear.as_dmat3()).as_mat3();
+            let turn = turn_of(linear);
             for splat in first..raw.positions.len() {
                 let rotation = splats.rotations[splat];
                 if !rotation.is_finite() || rotation.length_squared() == 0.0 {

@@ -2,7 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 
-use cagework_core::splats::{Splats, n_harmonics, splat_covariance};
+use cagework_core::splats::{Splats, color_along, n_harmonics, splat_covariance};
 use cagework_io::{Model, ModelFormat, UpAxis};
 use flate2::Compression;
 use flate2::read::GzDecoder;
@@ -421,16 +421,19 @@ fn nodes_of_a_glb_move_turn_and_scale_splats() {
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
     let json = String::from_utf8(glb[20..20 + length].to_vec()).unwrap();
     // A quarter turn about y and twice the size.
+    let with_node = |node: &str| {
+        let mut json = json.replace(r#"{"mesh":0}"#, node).into_bytes();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut glb_of_node = glb[..8].to_vec();
+        glb_of_node.extend((12 + 8 + json.len() as u32 + (glb.len() - 20 - length) as u32).to_le_bytes());
+        glb_of_node.extend((json.len() as u32).to_le_bytes());
+        glb_of_node.extend(b"JSON");
+        glb_of_node.extend(json);
+        glb_of_node.extend(&glb[20 + length..]);
+        read("a.glb", &glb_of_node).unwrap()
+    };
     let node = r#"{"mesh":0,"scale":[2,2,2],"rotation":[0,0.70710678,0,0.70710678],"translation":[1,0,0]}"#;
-    let mut json = json.replace(r#"{"mesh":0}"#, node).into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let mut turned = glb[..8].to_vec();
-    turned.extend((12 + 8 + json.len() as u32 + (glb.len() - 20 - length) as u32).to_le_bytes());
-    turned.extend((json.len() as u32).to_le_bytes());
-    turned.extend(b"JSON");
-    turned.extend(json);
-    turned.extend(&glb[20 + length..]);
-    let (before, after) = (capture(), read("a.glb", &turned).unwrap());
+    let (before, after) = (capture(), with_node(node));
     let quarter = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
     // A GLB has y up, a PLY y down.
     let half = Quat::from_rotation_x(std::f32::consts::PI);
@@ -440,6 +443,17 @@ fn nodes_of_a_glb_move_turn_and_scale_splats() {
         let axes = glam::Mat3::from_quat(quarter) * before.axes(s) * 2.0;
         let [a, b] = [splat_covariance(axes), splat_covariance(after.axes(s))];
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5 * a.abs().max(0.01)));
+    }
+    // A node that mirrors shows, in each direction, the colour of the mirrored direction.
+    let mirrored = with_node(r#"{"mesh":0,"scale":[-1,1,1]}"#);
+    let mirrored = mirrored.splats().unwrap();
+    for s in 0..6 {
+        for direction in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.6, 0.64, -0.48)] {
+            let seen = |of: &Splats, d: Vec3| color_along(of.colors[s], of.harmonics_of(s), d);
+            let [found, expected] =
+                [seen(mirrored, direction), seen(before, direction * Vec3::new(-1.0, 1.0, 1.0))];
+            assert!(found.abs_diff_eq(expected, 1e-5), "{s} {direction}: {found} {expected}");
+        }
     }
 }
 
