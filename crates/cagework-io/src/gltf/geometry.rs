@@ -1,17 +1,17 @@
 //! Reads primitives: world-space positions, triangles, normals and tangents.
 
-use cagework_core::words::counted;
 use std::collections::BTreeMap;
 
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Accessor;
 use ::gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
+use cagework_core::words::counted;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::accessor::Source;
 use super::scene::Instance;
-use super::{GltfDocument, GltfError, Slot, skin, splats};
+use super::{GltfDocument, GltfError, SPLATS_EXTENSION, Slot, skin};
 use crate::origin::relative;
 
 pub(crate) struct Geometry {
@@ -52,7 +52,7 @@ pub(crate) fn read(
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let Some((position, mode)) = surface(primitive) else {
-                match splats::declared(document, instance.mesh, p) {
+                match splats_of(document, instance.mesh, p) {
                     Some(n) => n_splats = n_splats.saturating_add(n),
                     None => skipped += 1,
                 }
@@ -152,6 +152,13 @@ fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<()
         document.source().floats::<4>(tangents, "TANGENT")?;
     }
     Ok(())
+}
+
+/// Number of splats of a primitive, which may declare any number; `None` if the primitive is not one of splats.
+fn splats_of(document: &GltfDocument, mesh: u32, p: usize) -> Option<u64> {
+    document.json["meshes"][mesh as usize]["primitives"][p]["extensions"].get(SPLATS_EXTENSION)?;
+    let position = attribute(&document.root.meshes[mesh as usize].primitives[p], Semantic::Positions);
+    Some(position.and_then(|of| document.source().count(of).ok()).unwrap_or(0))
 }
 
 /// Position accessor and mode of a triangle primitive; `None` for points and lines.

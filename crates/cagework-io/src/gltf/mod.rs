@@ -67,6 +67,9 @@ pub(crate) use size::MAX_TRIANGLES;
 pub(crate) use splats::{LINEAR as LINEAR_SPLATS, write as write_splats};
 pub(crate) use transfer::write_skinned;
 
+/// Extension of primitives that are splats.
+const SPLATS_EXTENSION: &str = "KHR_gaussian_splatting";
+
 /// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
 fn size_of_total(found: u64, declared: u64) -> String {
     let (unit, name) = [(1_000_000, "MB"), (1000, "kB")]

@@ -6,8 +6,8 @@ use ::gltf::binary::Glb;
 use glam::Vec3;
 use serde_json::{Value, json};
 
-use super::GltfDocument;
 use super::root::view_bytes;
+use super::{GltfDocument, SPLATS_EXTENSION};
 use crate::error::WriteError;
 
 pub(super) const F32: u32 = 5126;
@@ -34,7 +34,7 @@ const KNOWN_EXTENSIONS: [&str; 12] = [
     "KHR_animation_pointer",
     "KHR_xmp",
     "EXT_mesh_gpu_instancing",
-    "KHR_gaussian_splatting",
+    SPLATS_EXTENSION,
     "FB_ngon_encoding",
     PROJECT_EXTENSION,
 ];

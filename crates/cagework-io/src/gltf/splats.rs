@@ -8,12 +8,11 @@ use serde_json::{Value, json};
 use super::accessor::Source;
 use super::container::glb_of;
 use super::size::MAX_PRIMITIVES;
-use super::{GltfDocument, GltfError};
+use super::{GltfDocument, GltfError, SPLATS_EXTENSION};
 use crate::error::WriteError;
 use crate::look::linear_from_srgb;
 use crate::splats::{RawSplats, SplatError, SplatsToWrite, band_0, color_of, unit_byte};
 
-const EXTENSION: &str = "KHR_gaussian_splatting";
 /// Colour space of 3DGS captures.
 const SRGB: &str = "srgb_rec709_display";
 /// Colour space whose numbers are linear.
@@ -33,15 +32,8 @@ struct SplatPrimitive<'a> {
     degree: u8,
 }
 
-/// Number of splats of a primitive, which may declare any number; `None` if the primitive is not one of splats.
-pub(super) fn declared(document: &GltfDocument, mesh: u32, primitive: usize) -> Option<u64> {
-    let json = &document.json["meshes"][mesh as usize]["primitives"][primitive];
-    json["extensions"].get(EXTENSION)?;
-    Some(accessor(&json["attributes"], "POSITION").and_then(|of| document.source().count(of)).unwrap_or(0))
-}
-
 fn harmonic(degree: u8, coefficient: usize) -> String {
-    format!("{EXTENSION}:SH_DEGREE_{degree}_COEF_{coefficient}")
+    format!("{SPLATS_EXTENSION}:SH_DEGREE_{degree}_COEF_{coefficient}")
 }
 
 /// Reads the splats of the scene, and their colour space. `None` if it has triangles or no splats.
@@ -59,7 +51,7 @@ pub(crate) fn read(
                 return Ok(None);
             }
             let json = &document.json["meshes"][instance.mesh as usize]["primitives"][p];
-            let extension = &json["extensions"][EXTENSION];
+            let extension = &json["extensions"][SPLATS_EXTENSION];
             if !extension.is_object() {
                 continue;
             }
@@ -121,7 +113,7 @@ impl SplatPrimitive<'_> {
     }
 
     fn read(&self, source: Source<'_>, raw: &mut RawSplats) -> Result<(), GltfError> {
-        let of = |name: &str| format!("{EXTENSION}:{name}");
+        let of = |name: &str| format!("{SPLATS_EXTENSION}:{name}");
         let first = raw.positions.len();
         let positions = self.floats::<3>(source, "POSITION")?;
         raw.positions
@@ -179,7 +171,7 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, color_space: Option<&str>) -> 
     let bounds = cagework_core::Bounds::of(&splats.positions);
     let [min, max] = bounds.map_or([[0.0; 3]; 2], |b| [b.min.to_array(), b.max.to_array()]);
     (glb.accessors[0]["min"], glb.accessors[0]["max"]) = (json!(min), json!(max));
-    let of = |name: &str| format!("{EXTENSION}:{name}");
+    let of = |name: &str| format!("{SPLATS_EXTENSION}:{name}");
     glb.floats(&of("ROTATION"), splats.rotations.iter().map(Quat::to_array));
     glb.floats(&of("SCALE"), splats.scales.iter().map(Vec3::to_array));
     glb.floats(&of("OPACITY"), splats.opacities.iter().map(|&x| [x]));
@@ -204,14 +196,14 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, color_space: Option<&str>) -> 
     }
     let json = json!({
         "asset": { "version": "2.0", "generator": "Cagework" },
-        "extensionsUsed": [EXTENSION],
+        "extensionsUsed": [SPLATS_EXTENSION],
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
         "nodes": [node],
         "meshes": [{ "primitives": [{
             "mode": 0,
             "attributes": glb.attributes,
-            "extensions": { EXTENSION: { "kernel": "ellipse", "colorSpace": color_space } },
+            "extensions": { SPLATS_EXTENSION: { "kernel": "ellipse", "colorSpace": color_space } },
         }] }],
         "accessors": glb.accessors,
         "bufferViews": glb.views,
