@@ -88,6 +88,7 @@ impl<'a> Pack<'a> {
     }
 
     /// Replaces the bytes of a buffer view.
+    #[cfg(feature = "compress")]
     pub(super) fn replace_view(
         &mut self,
         json: &mut Value,
