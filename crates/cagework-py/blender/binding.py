@@ -30,6 +30,9 @@ class Binding(bpy.types.PropertyGroup):
     grid: bpy.props.IntProperty(
         name="Grid", description="Cells along the longest side of the cage", default=64, min=8, max=512
     )
+    # A driver reads the cage into this number, so that Blender evaluates the cage wherever it evaluates the mesh:
+    # without it, a cage that is hidden in renders keeps its last pose there.
+    pose: bpy.props.FloatProperty()
     stamp: bpy.props.StringProperty()
     weights: bpy.props.StringProperty(subtype="BYTE_STRING")
     report: bpy.props.StringProperty()
@@ -138,8 +141,6 @@ def cage_fault(mesh, scene):
     cage = mesh.cagework.cage
     if cage is None or cage.name not in scene.objects or scene.objects[cage.name] != cage:
         return "The cage was deleted: undo that, choose another cage, or unbind"
-    if not cage.visible_get():
-        return f"The cage {cage.name} is hidden, so the mesh keeps its shape: show the cage"
     if len(cage.data.polygons) == 0 and cage.mode != "EDIT":
         return f"{cage.name} has no faces: choose a closed mesh"
     return None
@@ -204,6 +205,7 @@ class Job:
             bound.cage, bound.owner, bound.grid, bound.stamp = self.cage, obj, self.grid, uuid4().hex
             bound.weights, bound.report = archive.getvalue(), card(report)
             live_key(obj)
+            drive(mesh)
             follow(obj, depsgraph)
 
 
@@ -232,6 +234,17 @@ def live_key(obj):
         key.value = 1.0
         obj.active_shape_key_index = active
     return key
+
+
+def drive(mesh):
+    """Makes a mesh depend on transform, shape keys and modifiers of its cage, by a driver."""
+    mesh.driver_remove("cagework.pose")
+    driver = mesh.driver_add("cagework.pose").driver
+    driver.type = "SUM"  # Unlike an expression, it needs no permission to run scripts.
+    for kind in ["TRANSFORMS", "SINGLE_PROP"]:
+        variable = driver.variables.new()
+        variable.type, variable.targets[0].id = kind, mesh.cagework.cage
+    variable.targets[0].data_path = "dimensions[0]"
 
 
 def posed_cage(obj, depsgraph):

@@ -120,6 +120,8 @@ class Bind(BoundObjectOperator, bpy.types.Operator):
             obj.data.cagework.cage = cage
             if fault := binding.fixed(obj) or binding.cage_fault(obj.data, context.scene):
                 raise cw.Error(fault)
+            if not cage.visible_get():
+                raise cw.Error(f"The cage {cage.name} is hidden: show it to bind, then hide it again")
             sharing = [o.name for o in context.scene.objects if o.data == obj.data and o != obj and o in objects]
             if sharing:
                 raise cw.Error(f"{obj.name} and {sharing[0]} share their mesh: select one, or make them single users")
@@ -416,9 +418,9 @@ class Bake(BoundObjectOperator, bpy.types.Operator):
         return bpy.path.relpath(path) if self.filepath.startswith("//") else path
 
 
-def curves(keys):
-    """The F-curves of shape keys, in the actions of Blender 4 and 5."""
-    action = keys.animation_data.action
+def curves(data):
+    """The F-curves of animated data, in the actions of Blender 4 and 5."""
+    action = data.animation_data.action
     if hasattr(action, "fcurves"):
         return list(action.fcurves)
     return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
@@ -436,6 +438,7 @@ class Unbind(BoundObjectOperator, bpy.types.Operator):
                 obj.shape_key_remove(keys.key_blocks[binding.KEY])
             if obj.data.shape_keys and len(obj.data.shape_keys.key_blocks) == 1:
                 obj.shape_key_clear()
+            obj.data.driver_remove("cagework.pose")
             obj.data.cagework.stamp, obj.data.cagework.weights, obj.data.cagework.report = "", b"", ""
         return {"FINISHED"}
 

@@ -144,6 +144,70 @@ def test_mesh_follows_shape_keys_and_modifiers_of_the_cage(body):
     assert np.abs(world(body) - before * [1.5, 1, 1] - np.array(bone)).max() < TOLERANCE
 
 
+def widen(cage):
+    """Adds a shape key to a cage that moves it by 1 along x."""
+    cage.shape_key_add(name="Basis")
+    key = cage.shape_key_add(name="Moved")
+    key.points.foreach_set("co", (local(cage.data) + [1, 0, 0]).astype(np.float32).ravel())
+    key.value = 0
+    return key
+
+
+@pytest.mark.parametrize("how", ["object", "viewport", "collection"])
+def test_mesh_follows_a_hidden_cage(body, how):
+    cage, scene = bind(body), bpy.context.scene
+    before, key = world(body), widen(cage)
+    if how == "object":
+        cage.hide_set(True)
+    elif how == "viewport":
+        cage.hide_viewport = True
+    else:
+        collection = bpy.data.collections.new("Hidden")
+        scene.collection.children.link(collection)
+        collection.objects.link(cage)
+        scene.collection.objects.unlink(cage)
+        bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
+    cage.location.y = 2
+    key.value = 0.5
+    assert np.abs(world(body) - before - [0.5, 2, 0]).max() < TOLERANCE
+    assert binding.problem(body, scene) is None
+
+
+@pytest.mark.parametrize("keyed", ["location", "shape key"])
+def test_renders_show_the_pose_of_a_cage_that_is_hidden_in_renders(body, keyed, tmp_path):
+    cage, scene = bind(body), bpy.context.scene
+    assert cage.hide_render
+    target, path = (cage, "location") if keyed == "location" else (widen(cage), "value")
+    target.keyframe_insert(path, frame=1)
+    setattr(target, path, (1, 0, 0) if keyed == "location" else 1)
+    target.keyframe_insert(path, frame=3)
+    for owner in [cage, cage.data.shape_keys]:
+        for curve in EXTENSION.operators.curves(owner) if owner and owner.animation_data else []:
+            for point in curve.keyframe_points:
+                point.interpolation = "LINEAR"
+    material = bpy.data.materials.new("Glow")
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    surface = nodes.new("ShaderNodeOutputMaterial").inputs["Surface"]
+    material.node_tree.links.new(nodes.new("ShaderNodeEmission").outputs[0], surface)
+    body.data.materials.append(material)
+    # Along z, 4 pixels per unit.
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.location.z, scene.camera.data.type, scene.camera.data.ortho_scale = 5, "ORTHO", 8
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    scene.render.threads_mode, scene.render.threads, scene.render.use_lock_interface = "FIXED", 1, True
+    scene.frame_start, scene.frame_end, scene.render.filepath = 1, 3, str(tmp_path / "frame")
+    scene.frame_set(2)
+    bpy.ops.render.render(animation=True)
+    for frame, x in [(1, 0.0), (2, 0.5), (3, 1.0)]:
+        image = bpy.data.images.load(str(tmp_path / f"frame{frame:04}.png"))
+        lit = np.array(image.pixels).reshape(32, 32, 4)[..., 0] > 0.5
+        assert abs(np.nonzero(lit)[1].mean() - (15.5 + 4 * x)) < 0.25, "the disc is centred on the body"
+
+
 def test_modifiers_of_the_mesh_act_on_the_posed_shape(body):
     cage = bind(body)
     body.modifiers.new("Subdivision", "SUBSURF").levels = 1
@@ -242,7 +306,8 @@ def test_reset_gives_the_cage_its_rest_shape(body):
 def test_faults_are_sentences(body, tmp_path):
     scene, cage = bpy.context.scene, bind(body)
     cage.hide_set(True)
-    assert "is hidden" in binding.problem(body, scene)
+    with pytest.raises(RuntimeError, match="is hidden"):
+        bpy.ops.cagework.bind()
     cage.hide_set(False)
     before = world(body)
     delete(cage)
