@@ -17,6 +17,8 @@ from cagework._sparse import csr_array
 KEY = "Cagework"
 # A matrix counts as singular if its determinant is at most this fraction of the cube of its largest entry.
 MIN_DETERMINANT = 1e-12
+# Largest move of points that stay in place, as a fraction of the largest rounded number: a few roundings of float32.
+PLACE_TOLERANCE = 1e-6
 
 
 class Binding(bpy.types.PropertyGroup):
@@ -35,6 +37,7 @@ class Binding(bpy.types.PropertyGroup):
     pose: bpy.props.FloatProperty()
     stamp: bpy.props.StringProperty()
     weights: bpy.props.StringProperty(subtype="BYTE_STRING")
+    to_bind: bpy.props.StringProperty(subtype="BYTE_STRING")
     report: bpy.props.StringProperty()
 
 
@@ -42,19 +45,18 @@ class Weights:
     """Weights of a bound mesh, from an archive in the mesh.
 
     rows: [n_points, n_cage] float32; rest: [n_cage, 3] the cage with modifiers and shape keys when bound, bind space;
-    cage_local: [n_cage_vertices, 3] the vertices of the cage's mesh without these, local space; to_bind: [4, 4];
+    cage_local: [n_cage_vertices, 3] the vertices of the cage's mesh without these, local space;
     frames, offsets: for points outside the cage, as in cagework.deform.
     """
 
     def __init__(self, archive):
         with np.load(io.BytesIO(archive), allow_pickle=False) as file:
             self.rows, self.rest, self.cage_local = file["rows"], file["rest"], file["cage_local"]
-            self.to_bind, frames = file["to_bind"], str(file["frames"])
+            frames = str(file["frames"])
             self.matrix, self.extra = None, None
             if "offsets" in file:
                 self.extra = {"frames": json.loads(frames), "offsets": sparse(file["offsets"])}
                 self.rested = cw.deform(self.sparse(), self.rest, self.extra)
-        self.posed = None
 
     def sparse(self):
         """The rows as a sparse matrix for cagework.deform."""
@@ -69,7 +71,19 @@ class Weights:
         return cw.deform(self.sparse(), posed, self.extra) - self.rested
 
 
+class Seen:
+    """What the last update of a bound mesh has seen. None: no update yet.
+
+    posed: [n_cage, 3], bind space; basis: [n_points, 3], local space; matrix: [4, 4], local to world space.
+    """
+
+    def __init__(self):
+        self.posed = self.basis = self.matrix = None
+
+
 WEIGHTS_CACHE: dict[str, Weights] = {}
+# By the mesh's `session_uid`: copies of a mesh share their stamp.
+SEEN: dict[int, Seen] = {}
 
 
 def sparse(rows):
@@ -86,6 +100,15 @@ def loaded(mesh):
             del WEIGHTS_CACHE[old]
         WEIGHTS_CACHE[stamp] = Weights(mesh.cagework.weights)
     return WEIGHTS_CACHE[stamp]
+
+
+def seen(mesh):
+    return SEEN.setdefault(mesh.session_uid, Seen())
+
+
+def to_bind(mesh):
+    """Matrix [4, 4] from the local space of a bound mesh to bind space."""
+    return np.frombuffer(mesh.cagework.to_bind).reshape(4, 4)
 
 
 def coordinates(points):
@@ -181,7 +204,7 @@ class Job:
         # A stored rest cage is in the bind space of its own mesh, so it is reused only if a single
         # object is bound.
         if keep_rest and kept and len(objects) == 1:
-            self.rest, self.cage_local, self.to_bind = kept[0].rest, kept[0].cage_local, [kept[0].to_bind]
+            self.rest, self.cage_local, self.to_bind = kept[0].rest, kept[0].cage_local, [to_bind(objects[0].data)]
         else:
             self.to_bind = [np.array(o.matrix_world, np.float64) for o in objects]
         self.points = [transform(basis(o.data), m) for o, m in zip(objects, self.to_bind)]
@@ -195,15 +218,16 @@ class Job:
             self.results = cw.bind_many(self.points, cage, grid=self.grid, progress=progress)
 
     def store(self, depsgraph):
-        for obj, to_bind, (weights, report) in zip(self.objects, self.to_bind, self.results):
+        for obj, matrix, (weights, report) in zip(self.objects, self.to_bind, self.results):
             mesh, parts = obj.data, {"rows": weights.toarray(), "rest": self.rest, "cage_local": self.cage_local}
             if report.get("offsets") is not None:
                 parts["offsets"] = report["offsets"].toarray()
             archive = io.BytesIO()
-            np.savez(archive, to_bind=to_bind, frames=json.dumps(report["frames"]), **parts)
+            np.savez(archive, frames=json.dumps(report["frames"]), **parts)
             bound = mesh.cagework
             bound.cage, bound.owner, bound.grid, bound.stamp = self.cage, obj, self.grid, uuid4().hex
-            bound.weights, bound.report = archive.getvalue(), card(report)
+            bound.weights, bound.to_bind, bound.report = archive.getvalue(), matrix.tobytes(), card(report)
+            SEEN.pop(mesh.session_uid, None)
             live_key(obj)
             drive(mesh)
             follow(obj, depsgraph)
@@ -250,23 +274,45 @@ def drive(mesh):
 def posed_cage(obj, depsgraph):
     """Returns the positions of the posed cage in the bind space of an object's mesh."""
     world, _ = cage_mesh(obj.data.cagework.cage, depsgraph)
-    matrix = loaded(obj.data).to_bind @ np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
-    return transform(world, matrix)
+    return transform(world, to_bind(obj.data) @ np.linalg.inv(evaluated_matrix(obj, depsgraph)))
+
+
+def evaluated_matrix(obj, depsgraph):
+    return np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64)
+
+
+def reach(points, matrix):
+    """Largest number in the products and sums that transform points, up to a factor of 3."""
+    return np.abs(points).max() * np.abs(matrix[:3, :3]).max() + np.abs(matrix[:3, 3]).max()
+
+
+def keep_place(obj, matrix, last):
+    """Adapts `to_bind` after Apply Scale, Set Origin and the like. They change the local points and the matrix of an
+    object, and keep its points in world space."""
+    points = basis(obj.data)
+    if last.basis is not None and len(points) == len(last.basis) and not np.array_equal(points, last.basis):
+        move = np.abs(transform(points, matrix) - transform(last.basis, last.matrix)).max()
+        if move <= PLACE_TOLERANCE * max(reach(points, matrix), reach(last.basis, last.matrix)):
+            change = np.linalg.inv(last.matrix) @ matrix
+            obj.data.cagework.to_bind = (to_bind(obj.data) @ change).tobytes()
+            last.posed = None
+    last.basis, last.matrix = points, matrix
 
 
 def follow(obj, depsgraph):
     """Writes the shape that the posed cage gives a bound mesh into its shape key. Returns a sentence if the cage does not fit."""
-    weights = loaded(obj.data)
+    weights, last = loaded(obj.data), seen(obj.data)
+    keep_place(obj, evaluated_matrix(obj, depsgraph), last)
     posed = posed_cage(obj, depsgraph)
     if len(posed) != len(weights.rest):
         return f"The cage has {len(posed)} vertices and had {len(weights.rest)} when bound: undo that, or bind again"
-    if weights.posed is not None and np.array_equal(posed, weights.posed):
+    if last.posed is not None and np.array_equal(posed, last.posed):
         return None
-    moved = weights.displacements(posed) @ np.linalg.inv(weights.to_bind[:3, :3]).T
+    moved = weights.displacements(posed) @ np.linalg.inv(to_bind(obj.data)[:3, :3]).T
     points = live_key(obj).points
-    points.foreach_set("co", (basis(obj.data) + moved).astype(np.float32).ravel())
+    points.foreach_set("co", (last.basis + moved).astype(np.float32).ravel())
     obj.data.update_tag()
-    weights.posed = posed
+    last.posed = posed
     return None
 
 
@@ -299,6 +345,5 @@ def rebind(obj, depsgraph):
 
 @persistent
 def forget(*_):
-    """Handler: after undo, redo or opening a file, forgets the last poses, so that the next update writes the shape keys."""
-    for weights in WEIGHTS_CACHE.values():
-        weights.posed = None
+    """Handler: after undo, redo or opening a file, forgets the last updates, so that the next one writes the shape keys."""
+    SEEN.clear()

@@ -111,6 +111,59 @@ def test_mesh_below_an_unevenly_scaled_empty_is_its_weights_times_the_cage_in_wo
     assert np.array_equal(local(cage.data), at_rest)
 
 
+def apply(**parts):
+    bpy.ops.object.transform_apply(**{"location": False, "rotation": False, "scale": False, **parts})
+
+
+def set_origin():
+    bpy.context.scene.cursor.location = (300, -200, 100)
+    bpy.ops.object.origin_set(type="ORIGIN_CURSOR")
+
+
+APPLIED = {
+    "scale": lambda: apply(scale=True),
+    "location": lambda: apply(location=True),
+    "all": lambda: apply(location=True, rotation=True, scale=True),
+    "origin": set_origin,
+}
+
+
+@pytest.mark.parametrize("operation", APPLIED.values(), ids=APPLIED.keys())
+def test_applied_transforms_and_origins_keep_the_shape(operation):
+    body = ball("Body", PLACES["turned, scaled unevenly, far"])
+    cage = bind(body)
+    move(cage, bend(local(cage.data)))
+    bpy.ops.ed.undo_push(message="pose")
+    before = world(body)
+    # Local coordinates near 400 are rounded to 3e-5.
+    tolerance = 1e-4
+    select(body)
+    operation()
+    assert np.abs(world(body) - before).max() < tolerance
+    cage.matrix_world = Matrix.Translation((1, 0, 0)) @ cage.matrix_world
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < tolerance
+    select(body)
+    bpy.ops.cagework.bind(keep_rest=True)
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < tolerance
+    bpy.ops.ed.undo_push(message="apply")
+    bpy.ops.ed.undo()
+    body = bpy.data.objects["Body"]
+    assert np.abs(world(body) - before).max() < tolerance
+    body.data.cagework.cage.matrix_world = Matrix.Translation((1, 0, 0)) @ body.data.cagework.cage.matrix_world
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < tolerance
+
+
+def test_mesh_moved_in_edit_mode_moves(body):
+    bind(body)
+    before = world(body)
+    select(body)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(1, 0, 0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+
+
 def test_mesh_follows_a_cage_in_edit_mode(body):
     cage = bind(body)
     points, rest = world(body), local(cage.data)
@@ -364,6 +417,19 @@ def test_linked_duplicates_take_the_same_shape_and_are_bound_once(body):
     select(body, twin)
     with pytest.raises(RuntimeError, match="share their mesh"):
         bpy.ops.cagework.bind()
+
+
+def test_duplicate_with_its_own_mesh_follows_from_the_same_place(body):
+    cage = bind(body)
+    before = world(body)
+    select(body)
+    bpy.ops.object.duplicate()
+    twin = bpy.context.active_object
+    assert twin.data != body.data
+    for x in [0.5, 1.0]:
+        cage.location.x = x
+        assert np.abs(world(body) - before - [x, 0, 0]).max() < TOLERANCE
+        assert np.abs(world(twin) - before - [x, 0, 0]).max() < TOLERANCE
 
 
 def test_several_meshes_follow_one_cage():
