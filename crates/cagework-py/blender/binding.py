@@ -39,6 +39,8 @@ class Binding(bpy.types.PropertyGroup):
     weights: bpy.props.StringProperty(subtype="BYTE_STRING")
     to_bind: bpy.props.StringProperty(subtype="BYTE_STRING")
     report: bpy.props.StringProperty()
+    # Names of the shape keys of the last bake, one per line.
+    baked: bpy.props.StringProperty()
 
 
 class Weights:
@@ -126,6 +128,34 @@ def transform(points, matrix):
 def basis(mesh):
     """Local positions of a mesh without its shape keys."""
     return coordinates(mesh.shape_keys.reference_key.points if mesh.shape_keys else mesh.vertices)
+
+
+def mixed(obj):
+    """Local positions of an object with its shape keys, without modifiers."""
+    keys = obj.data.shape_keys
+    if not keys:
+        return coordinates(obj.data.vertices)
+    if obj.show_only_shape_key:
+        return coordinates(obj.active_shape_key.points)
+    points = basis(obj.data)
+    for key in keys.key_blocks[1:]:
+        if key.value and not key.mute:
+            offsets = coordinates(key.points) - coordinates(key.relative_key.points)
+            points += key.value * group_weights(obj, key.vertex_group) * offsets
+    return points
+
+
+def group_weights(obj, name):
+    """Weights [n_points, 1] of a vertex group, or 1 if there is no such group."""
+    group = obj.vertex_groups.get(name)
+    if group is None:
+        return 1.0
+    weights = np.zeros((len(obj.data.vertices), 1))
+    for vertex in obj.data.vertices:
+        for part in vertex.groups:
+            if part.group == group.index:
+                weights[vertex.index] = part.weight
+    return weights
 
 
 def cage_mesh(cage, depsgraph):

@@ -234,10 +234,9 @@ def test_renders_show_the_pose_of_a_cage_that_is_hidden_in_renders(body, keyed, 
     target.keyframe_insert(path, frame=1)
     setattr(target, path, (1, 0, 0) if keyed == "location" else 1)
     target.keyframe_insert(path, frame=3)
-    for owner in [cage, cage.data.shape_keys]:
-        for curve in EXTENSION.operators.curves(owner) if owner and owner.animation_data else []:
-            for point in curve.keyframe_points:
-                point.interpolation = "LINEAR"
+    for curve in EXTENSION.operators.curves(target.id_data):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
     material = bpy.data.materials.new("Glow")
     material.use_nodes = True
     nodes = material.node_tree.nodes
@@ -593,6 +592,57 @@ def test_baked_frames_play_without_the_cage(body, form, tmp_path):
     for frame in range(1, 10, 2):
         scene.frame_set(frame)
         assert np.abs(world(body) - live[frame - 1]).max() < TOLERANCE, frame
+
+
+def masked_and_mixed(*objects, last=3):
+    """Binds objects, keys a move of their cage by 1 along x, and sets value, mask and a further key.
+
+    Returns for each object a function that gives its expected points for a move of the cage.
+    """
+    cage, formulas = bind(*objects), []
+    for frame, x in [(1, 0.0), (last, 1.0)]:
+        cage.location.x = x
+        cage.keyframe_insert("location", index=0, frame=frame)
+    for obj in objects:
+        before, live = world(obj) - [cage.location.x, 0, 0], obj.data.shape_keys.key_blocks[KEY]
+        weights = np.linspace(0, 1, len(before))
+        group = obj.vertex_groups.new(name="Mask")
+        for v, weight in enumerate(weights):
+            group.add([v], weight, "REPLACE")
+        live.value, live.vertex_group = 0.5, "Mask"
+        wide = obj.shape_key_add(name="Wide", from_mix=False)
+        wide.points.foreach_set("co", (binding.basis(obj.data) + [0, 2, 0]).astype(np.float32).ravel())
+        wide.value = 0.25
+        formulas.append(lambda x, b=before, w=weights: b + [0, 0.5, 0] + 0.5 * x * w[:, None] * [1, 0, 0])
+    return cage, formulas
+
+
+@pytest.mark.parametrize("form", ["KEYS", "MDD", "PC2"])
+def test_bake_keeps_value_mask_and_other_keys_and_replaces_the_last_bake(form, tmp_path):
+    body, shirt = ball("Body"), ball("Shirt", segments=12)
+    cage, formulas = masked_and_mixed(body, shirt)
+    scene, path = bpy.context.scene, str(tmp_path / "baked")
+    for step in [1, 2]:
+        select(body, shirt)
+        bpy.ops.cagework.bake(form=form, first=1, last=3, step=step, filepath=path)
+    assert scene.frame_current == 1
+    delete(cage)
+    for frame, x in [(1, 0.0), (3, 1.0)]:
+        scene.frame_set(frame)
+        for obj, formula in zip([body, shirt], formulas):
+            assert np.abs(world(obj) - formula(x)).max() < TOLERANCE, (frame, obj.name)
+
+
+def test_bake_stops_with_a_sentence_where_a_cage_changes_its_count_and_restores_the_frame(body):
+    cage, scene = bind(body), bpy.context.scene
+    split = cage.modifiers.new("Subdivision", "SUBSURF")
+    for frame, shown in [(1, False), (2, True)]:
+        split.show_viewport = shown
+        split.keyframe_insert("show_viewport", frame=frame)
+    scene.frame_set(1)
+    with pytest.raises(RuntimeError, match="vertices and had"):
+        bpy.ops.cagework.bake(form="KEYS", first=1, last=3)
+    assert scene.frame_current == 1
 
 
 def test_archive_of_the_extension_is_valid():
