@@ -27,6 +27,8 @@ class Binding(bpy.types.PropertyGroup):
     cage: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Cage", description="Closed mesh around the mesh", poll=lambda _, o: o.type == "MESH"
     )
+    # The cage of the weights. `cage` is the one that the user chose since.
+    bound_cage: bpy.props.PointerProperty(type=bpy.types.Object)
     # The object whose space the cage is mapped to, if several objects share the mesh.
     owner: bpy.props.PointerProperty(type=bpy.types.Object)
     grid: bpy.props.IntProperty(
@@ -47,7 +49,7 @@ class Weights:
     """Weights of a bound mesh, from an archive in the mesh.
 
     rows: [n_points, n_cage] float32; rest: [n_cage, 3] the cage with modifiers and shape keys when bound, bind space;
-    cage_local: [n_cage_vertices, 3] the vertices of the cage's mesh without these, local space;
+    cage_local: [n_cage_vertices, 3] the cage without modifiers, local space;
     frames, offsets: for points outside the cage, as in cagework.deform.
     """
 
@@ -76,11 +78,12 @@ class Weights:
 class Seen:
     """What the last update of a bound mesh has seen. None: no update yet.
 
-    posed: [n_cage, 3], bind space; basis: [n_points, 3], local space; matrix: [4, 4], local to world space.
+    posed: [n_cage, 3], bind space; basis: [n_points, 3], local space; matrix: [4, 4], local to world space;
+    fault: why the mesh did not follow, a sentence; unbound: the n_points for which a new bind failed.
     """
 
     def __init__(self):
-        self.posed = self.basis = self.matrix = None
+        self.posed = self.basis = self.matrix = self.fault = self.unbound = None
 
 
 WEIGHTS_CACHE: dict[str, Weights] = {}
@@ -201,15 +204,29 @@ def cage_fault(mesh, scene):
 
 def problem(obj, scene):
     """Why a bound mesh does not follow its cage, as a sentence, or None."""
+    return misfit(obj, scene) or seen(obj.data).fault
+
+
+def misfit(obj, scene):
+    """Why a bound mesh cannot follow its cage, as a sentence, or None. Does not look at the shape of the cage."""
     mesh = obj.data
-    if fault := fixed(obj) or cage_fault(mesh, scene):
+    if fault := fixed(obj) or cage_fault(mesh, scene) or other_cage(obj):
         return fault
     n = len(loaded(mesh).rows)
     if n != len(mesh.vertices):
-        return f"{obj.name} has {len(mesh.vertices)} vertices and was bound with {n}: rebind"
+        again = seen(mesh).fault if seen(mesh).unbound == len(mesh.vertices) else None
+        return again or f"{obj.name} has {len(mesh.vertices)} vertices and was bound with {n}: rebind"
     if not mesh.shape_keys or KEY not in mesh.shape_keys.key_blocks:
         return f"The shape key {KEY} of {obj.name} was deleted: rebind"
     return None
+
+
+def other_cage(obj):
+    """Says that a bound mesh was bound to another cage than the chosen one, or returns None."""
+    chosen, bound = obj.data.cagework.cage, obj.data.cagework.bound_cage
+    if chosen == bound:
+        return None
+    return f"{obj.name} is not bound to {chosen.name} yet: bind" + (f", or choose {bound.name}" if bound else "")
 
 
 def owners(scene):
@@ -228,8 +245,8 @@ class Job:
     def __init__(self, objects, cage, depsgraph, grid, keep_rest=False):
         self.objects, self.cage, self.grid = objects, cage, grid
         self.rest, faces = cage_mesh(cage, depsgraph)
-        self.cage_local = coordinates(cage.data.vertices)
-        kept = [loaded(o.data) for o in objects if o.data.cagework.stamp and o.data.cagework.cage == cage]
+        self.cage_local = mixed(cage)
+        kept = [loaded(o.data) for o in objects if o.data.cagework.stamp and o.data.cagework.bound_cage == cage]
         kept = [old for old in kept if len(old.rest) == len(self.rest)]
         # A stored rest cage is in the bind space of its own mesh, so it is reused only if a single
         # object is bound.
@@ -255,7 +272,8 @@ class Job:
             archive = io.BytesIO()
             np.savez(archive, frames=json.dumps(report["frames"]), **parts)
             bound = mesh.cagework
-            bound.cage, bound.owner, bound.grid, bound.stamp = self.cage, obj, self.grid, uuid4().hex
+            bound.cage = bound.bound_cage = self.cage
+            bound.owner, bound.grid, bound.stamp = obj, self.grid, uuid4().hex
             bound.weights, bound.to_bind, bound.report = archive.getvalue(), matrix.tobytes(), card(report)
             SEEN.pop(mesh.session_uid, None)
             live_key(obj)
@@ -352,23 +370,25 @@ def on_update(scene, depsgraph=None):
     if depsgraph is None:
         depsgraph = bpy.context.evaluated_depsgraph_get()
     for obj in owners(scene):
-        if obj.mode == "EDIT" or fixed(obj) or cage_fault(obj.data, scene):
+        mesh = obj.data
+        if obj.mode == "EDIT" or fixed(obj) or cage_fault(mesh, scene) or other_cage(obj):
             continue
-        if len(loaded(obj.data).rows) != len(obj.data.vertices) and len(obj.data.vertices):
-            rebind(obj, depsgraph)
-        elif not problem(obj, scene):
-            follow(obj, depsgraph)
+        n = len(mesh.vertices)
+        if n and n != len(loaded(mesh).rows):
+            if seen(mesh).unbound != n:
+                rebind(obj, depsgraph)
+        elif not misfit(obj, scene):
+            seen(mesh).fault = follow(obj, depsgraph)
 
 
 def rebind(obj, depsgraph):
-    """Binds an edited mesh again to the rest shape of its cage."""
+    """Binds an edited mesh again to the rest shape of its cage. After a fault, it keeps the weights for an undo."""
     job = Job([obj], obj.data.cagework.cage, depsgraph, obj.data.cagework.grid, keep_rest=True)
     try:
         job.solve()
     except cw.Error as error:
-        # The empty stamp marks the mesh as not bound, so that later updates do not try again.
-        obj.data.cagework.stamp = ""
-        print(f"Cagework: {obj.name} was not bound again: {error}")
+        last = seen(obj.data)
+        last.fault, last.unbound = f"{obj.name} was not bound again: {error}", len(obj.data.vertices)
         return
     job.store(depsgraph)
 

@@ -22,7 +22,7 @@ def meshes(context):
     """Selected meshes, the active one first. If a cage is active, the meshes that are bound to it."""
     active = context.active_object
     bound = [o for o in binding.owners(context.scene) if o.data.cagework.cage == active]
-    if bound:
+    if active and bound:
         return bound
     chosen = [o for o in context.selected_objects if o.type == "MESH"]
     if active and active.type == "MESH":
@@ -61,7 +61,7 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
         items=[("follow", "Follow", "Follows the limbs"), ("hull", "Hull", "The convex hull")],
     )
     clearance: bpy.props.FloatProperty(
-        name="Clearance", description="Distance from the mesh, as a fraction of its diagonal", default=0.0, min=0.0, max=0.5
+        name="Clearance", description="Distance from the mesh, as a fraction of its diagonal", default=0.0, min=0.0, max=0.25
     )
 
     @classmethod
@@ -190,7 +190,7 @@ class Reset(BoundObjectOperator, bpy.types.Operator):
     def execute(self, context):
         obj = bound_mesh(context)
         cage, local = obj.data.cagework.cage, binding.loaded(obj.data).cage_local
-        if fault := binding.cage_fault(obj.data, context.scene):
+        if fault := binding.cage_fault(obj.data, context.scene) or binding.other_cage(obj) or mixes(cage):
             return self.refuse(fault)
         if len(local) != len(cage.data.vertices):
             return self.refuse(f"The cage has {len(cage.data.vertices)} vertices and had {len(local)} when bound")
@@ -201,6 +201,14 @@ class Reset(BoundObjectOperator, bpy.types.Operator):
 def posed_points(cage):
     """The vertices of a cage, or the points of its active shape key if the cage has shape keys."""
     return cage.active_shape_key.points if cage.data.shape_keys else cage.data.vertices
+
+
+def mixes(cage):
+    """Says that the shape of a cage differs from its `posed_points`, or returns None."""
+    points = binding.coordinates(posed_points(cage))
+    if np.abs(binding.mixed(cage) - points).max() <= SHAPE_TOLERANCE * np.ptp(points, axis=0).max():
+        return None
+    return f"{cage.name} mixes shape keys: set the active key to 1 and the others to 0"
 
 
 def write_cage(cage, local):
@@ -226,8 +234,12 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         if fault := binding.problem(self.obj, context.scene):
             return fault
         depsgraph = context.evaluated_depsgraph_get()
-        if len(cage_now := binding.cage_mesh(cage, depsgraph)[0]) != len(cage.data.vertices) or cage.modifiers:
+        if cage.modifiers:
             return f"{cage.name} has modifiers: apply them, or pose it by hand"
+        if binding.singular(cage.matrix_world):
+            return f"{cage.name} has a scale of zero: set another scale"
+        if fault := mixes(cage):
+            return fault
         self.weights, self.cage = binding.loaded(mesh), cage
         mesh.calc_loop_triangles()
         corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
@@ -242,9 +254,6 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(to_bind)
         self.world_to_cage = np.linalg.inv(np.array(cage.matrix_world))
         self.before = binding.coordinates(posed_points(cage))
-        size = np.ptp(self.before, axis=0).max()
-        if np.abs(binding.transform(cage_now, self.world_to_cage) - self.before).max() > SHAPE_TOLERANCE * size:
-            return f"{cage.name} mixes shape keys: set the active key to 1 and the others to 0"
         return None
 
     def pull(self, vertex, world_target):

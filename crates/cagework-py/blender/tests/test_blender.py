@@ -355,6 +355,33 @@ def test_reset_gives_the_cage_its_rest_shape(body):
     assert np.array_equal(local(cage.data), rest) and np.abs(world(body) - before).max() < TOLERANCE
 
 
+def test_reset_gives_a_cage_with_mixed_shape_keys_its_rest_shape(body):
+    select(body)
+    bpy.ops.cagework.make_cage(vertices=40)
+    cage = body.data.cagework.cage
+    cage.shape_key_add(name="Basis")
+    rest, keys = local(cage.data), []
+    for factors in [[1.5, 1, 1], [1, 1, 2]]:
+        key = cage.shape_key_add(name="Key", from_mix=False)
+        key.points.foreach_set("co", (rest * factors).astype(np.float32).ravel())
+        keys.append(key)
+    group = cage.vertex_groups.new(name="Mask")
+    group.add(range(len(rest)), 0.5, "REPLACE")
+    keys[1].vertex_group, keys[0].value, keys[1].value = "Mask", 1, 0.4
+    cage.active_shape_key_index = 1
+    bpy.context.view_layer.update()
+    bpy.ops.cagework.bind()
+    before = world(body)
+    with pytest.raises(RuntimeError, match="mixes shape keys"):
+        bpy.ops.cagework.reset()
+    keys[1].value = 0
+    assert np.abs(world(body) - before).max() > 0.1
+    bpy.ops.cagework.reset()
+    # The rest shape: 1.5 x, y and z + 0.4 * 0.5 * z.
+    assert np.abs(binding.coordinates(keys[0].points) - rest * [1.5, 1, 1.2]).max() < TOLERANCE
+    assert np.abs(world(body) - before).max() < TOLERANCE
+
+
 def test_faults_are_sentences(body, tmp_path):
     scene, cage = bpy.context.scene, bind(body)
     cage.hide_set(True)
@@ -380,6 +407,84 @@ def test_faults_are_sentences(body, tmp_path):
     scene.collection.objects.link(body.data.cagework.cage)
     with pytest.raises(RuntimeError, match="not closed"):
         bpy.ops.cagework.bind()
+
+
+def test_another_cage_is_used_only_after_a_bind(body):
+    scene, first = bpy.context.scene, bind(body, vertices=40)
+    before = world(body)
+    select(body)
+    bpy.ops.cagework.make_cage(vertices=40, clearance=0.2)
+    second = body.data.cagework.cage
+    assert len(second.data.vertices) == len(first.data.vertices) and second != first
+    assert np.abs(world(body) - before).max() < TOLERANCE
+    assert first.name in binding.problem(body, scene)
+    with pytest.raises(RuntimeError, match="not bound to"):
+        bpy.ops.cagework.reset()
+    body.data.cagework.cage = first
+    assert binding.problem(body, scene) is None
+    body.data.cagework.cage = second
+    bpy.ops.cagework.bind(keep_rest=True)
+    assert binding.problem(body, scene) is None and np.abs(world(body) - before).max() < TOLERANCE
+    second.location.x += 1
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+
+
+def test_modifier_that_changes_the_number_of_cage_vertices_is_a_fault(body):
+    scene, cage = bpy.context.scene, bind(body)
+    before = world(body)
+    cage.modifiers.new("Subdivision", "SUBSURF")
+    assert np.array_equal(world(body), before) and "vertices and had 40 when bound" in binding.problem(body, scene)
+    cage.modifiers.clear()
+    cage.location.x += 1
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE and binding.problem(body, scene) is None
+
+
+def test_failed_new_bind_says_why_and_keeps_the_weights(body, monkeypatch):
+    """The bind of an edited mesh fails once, and is not tried again for each update."""
+    scene, cage, tries = bpy.context.scene, bind(body), []
+    before = world(body)
+    bpy.ops.ed.undo_push(message="bind")
+
+    def fail(*_, **__):
+        tries.append(1)
+        raise cw.Error("out of memory")
+
+    monkeypatch.setattr(cw, "bind", fail)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for _ in range(3):
+        cage.location.x += 1
+        bpy.context.view_layer.update()
+    assert len(tries) == 1 and "was not bound again: out of memory" in binding.problem(body, scene)
+    assert body.data.cagework.stamp
+    monkeypatch.undo()
+    bpy.ops.cagework.bind(keep_rest=True)
+    assert binding.problem(body, scene) is None
+    assert np.abs(world(body)[: len(before)] - before - [3, 0, 0]).max() < TOLERANCE
+
+
+def test_pull_refuses_a_cage_with_a_scale_of_zero(body):
+    cage = bind(body)
+    cage.scale.x = 0
+    bpy.context.view_layer.update()
+    select(body)
+    with pytest.raises(RuntimeError, match=f"{cage.name} has a scale of zero"):
+        bpy.ops.cagework.pull(vertex=3, offset=(0.1, 0, 0))
+
+
+def test_without_an_active_object_no_mesh_is_chosen(body):
+    bind(body)
+    body.data.cagework.cage = None
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = None
+    assert EXTENSION.operators.meshes(bpy.context) == []
+
+
+def test_largest_clearance_makes_a_cage(body):
+    select(body)
+    largest = bpy.ops.cagework.make_cage.get_rna_type().properties["clearance"].hard_max
+    assert bpy.ops.cagework.make_cage(vertices=40, clearance=largest) == {"FINISHED"}
 
 
 def test_linked_mesh_is_refused_and_its_override_does_not_fail(body, tmp_path):
