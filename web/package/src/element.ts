@@ -255,10 +255,24 @@ export class CageDeformer extends Base {
 }
 
 async function download(address: URL): Promise<Source> {
-  const response = await fetch(address);
-  const name = decodeURIComponent(address.pathname.split("/").at(-1) ?? "") || undefined;
-  if (response.ok) return { name, file: await response.blob() };
-  throw named("Unreadable", `${address.href} could not be downloaded (${response.status})`);
+  const fail = (why: string | number) =>
+    named("Unreadable", `${address.href} could not be downloaded (${why})`);
+  const unreachable = (error: unknown) => {
+    throw fail(error instanceof Error ? error.message : String(error));
+  };
+  const response = await fetch(address).catch(unreachable);
+  if (!response.ok) throw fail(response.status);
+  return { name: nameIn(address), file: await response.blob().catch(unreachable) };
+}
+
+function nameIn(address: URL): string | undefined {
+  const last = address.pathname.split("/").at(-1) || undefined;
+  try {
+    return last && decodeURIComponent(last);
+  } catch {
+    // A "%" that begins no escape belongs to the name.
+    return last;
+  }
 }
 
 if (globalThis.customElements && !customElements.get("cage-deformer")) {

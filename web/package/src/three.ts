@@ -12,12 +12,15 @@ export interface Attribute {
   getY(index: number): number;
   getZ(index: number): number;
   setXYZ(index: number, x: number, y: number, z: number): unknown;
+  readonly array: ArrayLike<number>;
+  clone(): unknown;
   set needsUpdate(value: boolean);
 }
 
 /** Members of three.js's `BufferGeometry` that are used here. */
 export interface Geometry {
   getAttribute(name: "position" | "normal"): unknown;
+  setAttribute(name: "position", attribute: never): unknown;
   getIndex(): { readonly count: number; getX(index: number): number } | null;
   computeBoundingSphere(): void;
   computeBoundingBox(): void;
@@ -39,7 +42,7 @@ export type DeformerOptions = BindCallOptions & {
 interface Part {
   readonly geometry: Geometry;
   readonly first: number;
-  readonly position: Attribute;
+  position: Attribute;
   readonly normal: Attribute | undefined;
   readonly group: Uint32Array;
 }
@@ -111,8 +114,10 @@ export class CageDeformer {
       this.#isOutdated = false;
       const points = await deform(this.weights, this.pose);
       const normals = normalsOf(points, this.#triangles, this.#parts);
-      for (const { geometry, first, position, normal } of this.#parts) {
-        write(position, points, first);
+      for (const part of this.#parts) {
+        const { geometry, first, normal } = part;
+        part.position = asFloats(geometry, part.position);
+        write(part.position, points, first);
         if (normal) write(normal, normals, first);
         geometry.computeBoundingSphere();
         geometry.computeBoundingBox();
@@ -195,6 +200,21 @@ function normalsOf(points: Float32Array, triangles: Uint32Array, parts: readonly
     const length = Math.hypot(sums[g] ?? 0, sums[g + 1] ?? 0, sums[g + 2] ?? 0);
     return (sums[g + (k % 3)] ?? 0) / (length || 1);
   });
+}
+
+/**
+ * Returns positions that can hold any pose. Integers wrap around where a pose leaves their range, so a quantised
+ * attribute is replaced by a copy in floats.
+ */
+function asFloats(geometry: Geometry, position: Attribute): Attribute {
+  const isHalf = "isFloat16BufferAttribute" in position;
+  if (isHalf || position.array instanceof Float32Array || position.array instanceof Float64Array)
+    return position;
+  // The clone of an interleaved attribute is not interleaved.
+  const copy = position.clone() as Attribute;
+  Object.assign(copy, { array: new Float32Array(copy.array.length), normalized: false });
+  geometry.setAttribute("position", copy as never);
+  return copy;
 }
 
 function write(attribute: Attribute, values: Float32Array, first: number): void {

@@ -237,6 +237,36 @@ for (const [how, address] of [
   });
 }
 
+test("an element names failed downloads, and opens a file with a percent sign in its name", async ({
+  visit,
+}) => {
+  const page = await visit("webgl", "element.html");
+  await ready(page);
+  /** Opens an address with another `fetch`, because Chromium writes failed downloads to the console. */
+  const opened = (src: string, status: number) =>
+    page.evaluate(
+      async ([src, status]) => {
+        const { fetch } = globalThis;
+        globalThis.fetch = async () => {
+          if (!status) throw new TypeError("Failed to fetch");
+          return status === 200 ? fetch("model.glb") : new Response(null, { status });
+        };
+        const element = document.querySelector("cage-deformer");
+        return new Promise((resolve) => {
+          const listen = { once: true };
+          element?.addEventListener("error", (event) => resolve((event as ErrorEvent).error.name), listen);
+          element?.addEventListener("ready", () => resolve("ready"), listen);
+          element?.setAttribute("src", src);
+        }).finally(() => Object.assign(globalThis, { fetch }));
+      },
+      [src, status] as const,
+    );
+  expect(await opened("missing.glb", 404)).toBe("Unreadable");
+  expect(await opened("unreachable.glb", 0)).toBe("Unreadable");
+  await expect(page.locator("cage-deformer p")).toHaveText(/unreachable\.glb could not be downloaded/);
+  expect(await opened("50%.glb", 200)).toBe("ready");
+});
+
 test("an element opens compressed files, reports unreadable ones and frees its memory", async ({ visit }) => {
   const page = await visit("webgl", "element.html");
   const open = (src: string) =>

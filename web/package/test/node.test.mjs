@@ -380,6 +380,36 @@ test("geometries of three.js follow one cage, with smooth normals across seams",
   await assert.rejects(CageDeformer.create(empty), { name: "Missing" });
 });
 
+for (const [type, isNormalized, centre, scale] of [
+  [Int16Array, true, 0, 1],
+  [Uint16Array, false, 0.95, 1000],
+]) {
+  for (const isInterleaved of [false, true]) {
+    const layout = isInterleaved ? "interleaved " : "";
+    test(`${layout}positions in ${type.name}s follow a cage beyond their range`, async () => {
+      const geometry = new SphereGeometry(0.9, 16, 12).translate(centre, centre, centre);
+      const { position } = geometry.scale(scale, scale, scale).attributes;
+      const buffer = new InterleavedBuffer(new type(4 * position.count), 4);
+      const quantised = isInterleaved
+        ? new InterleavedBufferAttribute(buffer, 3, 0, isNormalized)
+        : new BufferAttribute(new type(3 * position.count), 3, isNormalized);
+      for (let v = 0; v < position.count; v++) {
+        quantised.setXYZ(v, position.getX(v), position.getY(v), position.getZ(v));
+      }
+      geometry.setAttribute("position", quantised);
+      const rest = Array.from({ length: position.count }, (_, v) => quantised.getX(v));
+      const deformer = await CageDeformer.create(geometry, { grid: 24, cageOptions: { target: 30 } });
+      for (const shift of [-0.3, 0.3]) {
+        deformer.pose.set(deformer.cage.positions.map((x, k) => (k % 3 === 0 ? x + shift * scale : x)));
+        await deformer.update();
+        const moved = geometry.attributes.position;
+        const errors = rest.map((x, v) => Math.abs(moved.getX(v) - x - shift * scale));
+        assert.ok(Math.max(...errors) < 10 * ROUNDING * scale, `${Math.max(...errors)}`);
+      }
+    });
+  }
+}
+
 function facesOf({ corners }) {
   let faces = 0;
   for (let k = 0; k < corners.length; k += 1 + corners[k]) faces += 1;
