@@ -32,9 +32,15 @@ impl Points<'_> {
 }
 
 /// Converts a value to a C-contiguous array in the byte order of the machine. Such an array is returned unchanged.
-fn c_contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let none = value.py().None();
-    let array = value.py().import("numpy")?.call_method1("require", (value, none, "CA"))?;
+///
+/// # Errors
+/// `ArrayError` if entries are masked, because the conversion would use the numbers behind the mask.
+fn c_contiguous<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let (none, numpy) = (value.py().None(), value.py().import("numpy")?);
+    if value.hasattr("mask")? && numpy.getattr("ma")?.call_method1("is_masked", (value,))?.is_truthy()? {
+        return Err(error::array(format!("{name}: entries are masked; fill them or remove their rows")));
+    }
+    let array = numpy.call_method1("require", (value, none, "CA"))?;
     let array: Bound<'py, PyUntypedArray> = array.cast_into()?;
     if array.dtype().is_native_byteorder() != Some(false) {
         return Ok(array);
@@ -59,7 +65,7 @@ pub(crate) fn points<'py>(
     n: Option<usize>,
     origin: DVec3,
 ) -> PyResult<Points<'py>> {
-    let array = c_contiguous(value)?;
+    let array = c_contiguous(name, value)?;
     let fits = matches!(*array.shape(), [rows, 3] if n.is_none_or(|n| n == rows));
     match (fits, array.cast::<PyArray2<f32>>(), array.cast::<PyArray2<f64>>()) {
         (true, Ok(array), _) if origin == DVec3::ZERO => Ok(Points::Borrowed(array.try_readonly()?)),
@@ -78,6 +84,26 @@ pub(crate) fn points<'py>(
             let n = n.map_or("n".to_owned(), |n| n.to_string());
             Err(mismatch(name, &array, &format!("float32 or float64 of shape [{n}, 3]")))
         }
+    }
+}
+
+/// Like [`points`], for points that must have finite coordinates.
+///
+/// # Errors
+/// `ArrayError`, with the actual and the expected type and shape, or with the first row that is not finite.
+pub(crate) fn finite_points<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    n: Option<usize>,
+    origin: DVec3,
+) -> PyResult<Points<'py>> {
+    let points = points(name, value, n, origin)?;
+    match points.as_slice().iter().position(|p| !p.is_finite()) {
+        Some(row) => Err(error::array(format!(
+            "{name}: row {row} is {:?}; coordinates must be finite in float32",
+            points.as_slice()[row].to_array()
+        ))),
+        None => Ok(points),
     }
 }
 
@@ -114,7 +140,7 @@ fn indices(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> PyR
 /// # Errors
 /// `ArrayError` if the array has another type or shape, or an index is negative or too large.
 pub(crate) fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
-    let (array, expected) = (c_contiguous(value)?, "integers of shape [n]");
+    let (array, expected) = (c_contiguous(name, value)?, "integers of shape [n]");
     match *array.shape() {
         [0] => Ok(Vec::new()),
         [_] => indices(name, &array, expected),
@@ -127,7 +153,8 @@ pub(crate) fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
 /// # Errors
 /// `ArrayError` if the array has another type or shape, or an index is negative or too large.
 pub(crate) fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
-    let (name, array, expected) = ("triangles", c_contiguous(value)?, "integers of shape [n, 3]");
+    let name = "triangles";
+    let (array, expected) = (c_contiguous(name, value)?, "integers of shape [n, 3]");
     match *array.shape() {
         [_, 3] => Ok(indices(name, &array, expected)?.as_chunks().0.to_vec()),
         _ => Err(mismatch(name, &array, expected)),
@@ -143,7 +170,7 @@ pub(crate) fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
         return value.try_iter()?.map(|face| list("a face", &face?)).collect();
     };
     let (array, expected) =
-        (c_contiguous(array)?, "integers of shape [n, 3] or [n, 4], or a list of such arrays");
+        (c_contiguous("faces", array)?, "integers of shape [n, 3] or [n, 4], or a list of such arrays");
     match *array.shape() {
         [_, k] if k > 0 => Ok(indices("faces", &array, expected)?.chunks(k).map(<[u32]>::to_vec).collect()),
         _ => Err(mismatch("faces", &array, expected)),
@@ -214,7 +241,7 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
             "weights: expected a sparse matrix or array of SciPy, got {actual}"
         )));
     };
-    let part = |name: &str| c_contiguous(&rows.getattr(name)?);
+    let part = |name: &str| c_contiguous("weights", &rows.getattr(name)?);
     let data = part("data")?;
     if data.dtype().kind() != b'f' {
         return Err(mismatch("weights", &data, "float32 or float64"));

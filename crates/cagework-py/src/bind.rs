@@ -30,7 +30,7 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// points: [n_points, 3] float32 or float64, object units. A C-contiguous float32 array is not copied, so do not write to it while
 /// bind runs.
 ///
-/// Returns (weights, report). weights: scipy.sparse.csr_array [n_points, n_cage] of float32; each row sums to 1. report: dict with
+/// Returns (weights, report). weights: scipy.sparse.csr_array [n_points, n_cage] of float32; the rows of points inside sum to 1. report: dict with
 /// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and the other entries that
 /// `cagework bind --report` writes; outside: arrays vertex [k], distance [k] (object units) and share [k] of the points outside the
 /// cage. If points are outside, or near inner controls, it also has offsets (csr_array) and frames, which deform uses.
@@ -114,8 +114,9 @@ fn weights_and_report(py: Python<'_>, binding: Binding) -> PyResult<WeightsAndRe
 /// Deforms the bound points: deform(weights, posed, report=None) -> [n_points, 3], object units
 ///
 /// weights: sparse matrix [n_points, n_cage]; posed: [n_cage, 3] float32 or float64, object units; report: the report of bind,
-/// needed for points with offsets. Without it the result is weights @ posed, summed in float64. Returns float32, or float64 if
-/// posed is so far from the origin that float32 would lose digits.
+/// needed for points with offsets, such as points outside. Without it the result is weights @ posed, summed in float64. Returns
+/// float32, or float64 if posed is so far from the origin that float32 would lose digits; posed is then taken relative to a point
+/// near it, so rows that do not sum to 1 need the report.
 ///
 /// Raises ArrayError.
 ///

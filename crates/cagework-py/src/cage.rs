@@ -124,7 +124,8 @@ impl Cage {
         let mut mesh = self.mesh();
         if let Some(vertices) = vertices {
             let n = mesh.positions.len();
-            mesh.positions = arrays::points("vertices", vertices, Some(n), self.origin)?.as_slice().to_vec();
+            let posed = arrays::finite_points("vertices", vertices, Some(n), self.origin)?;
+            mesh.positions = posed.as_slice().to_vec();
         }
         files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh, self.origin))
     }

@@ -50,7 +50,7 @@ impl Field {
     ) -> PyResult<Self> {
         CELLS_RANGE.check(cells).map_err(error::option)?;
         let (options, controls) = (bind_options(options)?, cage.get().controls());
-        let posed = arrays::points("posed", posed, Some(controls.n_controls()), cage.get().origin())?;
+        let posed = arrays::finite_points("posed", posed, Some(controls.n_controls()), cage.get().origin())?;
         let posed = posed.as_slice();
         let made = work::run(py, move |progress| -> Result<_, BindError> {
             let weights = FieldWeights::bind(controls, cells as u32, &options, progress)?;
@@ -72,7 +72,7 @@ impl Field {
     fn pose(&self, py: Python<'_>, posed: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (cage, weights) = (self.cage.get(), self.weights.clone());
         let controls = cage.controls();
-        let posed = arrays::points("posed", posed, Some(controls.n_controls()), cage.origin())?;
+        let posed = arrays::finite_points("posed", posed, Some(controls.n_controls()), cage.origin())?;
         let posed = posed.as_slice();
         let field = work::run(py, |_| weights.pose(controls.rest(), posed))?;
         Ok(Self { weights, field, cage: self.cage.clone_ref(py) })

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use cagework_core::BindOptions;
 use cagework_io::{Clip, Model, Resolve};
 use numpy::PyArray2;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyList};
+use pyo3::types::{PyByteArray, PyBytes, PyList, PyMemoryView};
 
 use crate::{arrays, error, work};
 
@@ -18,12 +19,22 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// Interprets an argument: bytes, or a path.
-    pub(crate) fn of(argument: &Bound<'_, PyAny>) -> PyResult<Self> {
-        match argument.cast::<PyBytes>() {
-            Ok(bytes) => Ok(Self::Bytes(bytes.as_bytes().to_vec())),
-            Err(_) => Ok(Self::File(argument.extract()?)),
+    /// Interprets an argument: bytes, a bytearray or a memoryview, or a path.
+    ///
+    /// # Errors
+    /// `TypeError` with the name of the argument.
+    pub(crate) fn of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(bytes) = argument.cast::<PyBytes>() {
+            return Ok(Self::Bytes(bytes.as_bytes().to_vec()));
         }
+        if argument.is_instance_of::<PyByteArray>() || argument.is_instance_of::<PyMemoryView>() {
+            let bytes = argument.py().get_type::<PyBytes>().call1((argument,))?;
+            return Ok(Self::Bytes(bytes.extract()?));
+        }
+        argument.extract().map(Self::File).or_else(|_| {
+            let kind = argument.get_type().name()?;
+            Err(PyTypeError::new_err(format!("{name}: expected a path or bytes, got {kind}")))
+        })
     }
 
     /// Reads the model and the files in its folder that it refers to, with the default memory limit.
@@ -115,8 +126,8 @@ pub(crate) fn read_model<'py>(
     clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
     let sources: Vec<Source> = match model.cast::<PyList>() {
-        Ok(models) => models.iter().map(|model| Source::of(&model)).collect::<PyResult<_>>()?,
-        Err(_) => vec![Source::of(model)?],
+        Ok(models) => models.iter().map(|model| Source::of("model", &model)).collect::<PyResult<_>>()?,
+        Err(_) => vec![Source::of("model", model)?],
     };
     let (positions, triangles, origin) = work::run(py, move |_| -> PyResult<_> {
         let (mut positions, mut triangles, mut origin) = (Vec::new(), Vec::new(), None);

@@ -3,12 +3,15 @@
 use cagework_io::{json_fault, value_fault};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict};
+use pyo3::types::PyDict;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::error;
+
+/// 2^53: all smaller whole numbers have an exact f64.
+const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// Reads options from keyword arguments. Missing arguments and `None` mean the default.
 ///
@@ -36,8 +39,14 @@ pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
 }
 
 fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
-    if value.is_instance_of::<PyBool>() {
-        return value.extract::<bool>().map(Value::from);
+    // Also a bool of NumPy.
+    if let Ok(flag) = value.extract::<bool>() {
+        return Ok(Value::from(flag));
+    }
+    // The float 24.0 counts as the whole number 24.
+    let whole = |x: f64| x.fract() == 0.0 && x.abs() < MAX_WHOLE;
+    if let Some(x) = value.extract::<f64>().ok().filter(|&x| whole(x)) {
+        return Ok(Value::from(x as i64));
     }
     let number = value.extract::<u64>().map(Value::from).or_else(|_| value.extract::<i64>().map(Value::from));
     let number = number.or_else(|_| value.extract::<f64>().map(Value::from));

@@ -59,7 +59,7 @@ pub(crate) fn pull<'py>(
     // may not enclose them.
     let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
     let (controls, origin) = (cage.get().controls(), cage.get().origin());
-    let positions = arrays::points("vertices", vertices, None, origin)?.as_slice().to_vec();
+    let positions = arrays::finite_points("vertices", vertices, None, origin)?.as_slice().to_vec();
     let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
     let weights = arrays::weights(weights)?;
     let (weights, frames) = arrays::join_offsets(report, weights)?;
@@ -73,7 +73,7 @@ pub(crate) fn pull<'py>(
         return Err(error::pull(format!("a target is {at}; its coordinates must be finite in float32")));
     }
     let n = controls.n_controls();
-    let start = start.map(|start| arrays::points("start", start, Some(n), origin)).transpose()?;
+    let start = start.map(|start| arrays::finite_points("start", start, Some(n), origin)).transpose()?;
     let start: Vec<Vec3> = start.map_or_else(|| controls.rest().to_vec(), |start| start.as_slice().to_vec());
     let reach = match reach {
         None => Reach::Automatic,

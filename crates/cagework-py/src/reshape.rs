@@ -91,7 +91,8 @@ pub(crate) fn reshape<'py>(
     if let Some((name, amount)) = mask.iter().find(|(_, amount)| !(0.0..=1.0).contains(amount)) {
         return Err(error::option(format!("the mask of {name:?} is {amount}; it must be from 0 to 1")));
     }
-    let (options, controls, source) = (bind_options(options)?, cage.get().controls(), Source::of(model)?);
+    let (options, controls, source) =
+        (bind_options(options)?, cage.get().controls(), Source::of("model", model)?);
     let origin = cage.get().origin();
     let pose = |posed: &Bound<'py, PyAny>| {
         Ok::<_, PyErr>(
@@ -126,7 +127,7 @@ pub(crate) fn reshape<'py>(
             ..ReshapeOptions::default()
         },
         mask,
-        skeleton: skeleton.map(Source::of).transpose()?,
+        skeleton: skeleton.map(|body| Source::of("skeleton", body)).transpose()?,
         is_static: r#static,
         size: CompactOptions { quantize, compress: word("compress", compress)? },
         origin,

@@ -40,7 +40,7 @@ pub(crate) fn transfer<'py>(
     if let Some(distance) = push_out.filter(|distance| !(distance.is_finite() && *distance > 0.0)) {
         return Err(error::option(format!("push_out is {distance}; it must be a positive distance")));
     }
-    let [body, clothes] = [Source::of(body)?, Source::of(clothes)?];
+    let [body, clothes] = [Source::of("body", body)?, Source::of("clothes", clothes)?];
     let options = TransferOptions { push_out, memory_limit };
     let (glb, report) = work::run(py, move |_| {
         let [body, clothes] = [body.read_within(memory_limit)?, clothes.read_within(memory_limit)?];

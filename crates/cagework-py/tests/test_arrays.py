@@ -38,6 +38,38 @@ def test_wrong_types_and_shapes_are_reported_with_the_expected_ones(call, actual
     assert isinstance(error.value, cw.Error) and isinstance(error.value, ValueError)
 
 
+NAN = np.where(np.arange(8)[:, None] == 3, np.nan, CUBE.vertices)
+TRIANGLE = [[0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: cw.Field(CUBE, NAN, cells=8), "posed"),
+        (lambda: cw.Field(CUBE, CUBE.vertices, cells=8).pose(NAN), "posed"),
+        (lambda: CUBE.save("nan.obj", NAN), "vertices"),
+        (lambda: cw.pull(NAN / 2, TRIANGLE, CUBE, cw.bind(CUBE.vertices / 2, CUBE, grid=8)[0], [0], POINTS[:1]), "vertices"),
+        (lambda: cw.pull(CUBE.vertices / 2, TRIANGLE, CUBE, scipy.sparse.eye_array(8), [0], POINTS[:1], start=NAN), "start"),
+    ],
+)
+def test_rows_that_are_not_finite_are_named(call, name):
+    with pytest.raises(cw.ArrayError, match=f"{name}: row 3 is .NaN, NaN, NaN.; coordinates must be finite"):
+        call()
+
+
+def test_masked_entries_are_refused():
+    masked = np.ma.masked_array(POINTS, mask=np.arange(15).reshape(5, 3) == 7)
+    for call in [
+        lambda: cw.bind(masked, CUBE, grid=8),
+        lambda: cw.generate_cage(POINTS, np.ma.masked_equal(TRIANGLE, 1)),
+        lambda: cw.Cage(CUBE.vertices, np.ma.masked_equal(box()[1], 1)),
+    ]:
+        with pytest.raises(cw.ArrayError, match="(points|triangles|faces): entries are masked"):
+            call()
+    unmasked = np.ma.masked_array(POINTS)
+    assert abs(cw.bind(unmasked, CUBE, grid=8)[0] - cw.bind(POINTS, CUBE, grid=8)[0]).max() == 0
+
+
 def test_negative_indices_are_named():
     with pytest.raises(cw.ArrayError, match="index -1 is not between 0 and 4294967295"):
         cw.generate_cage(POINTS, [[0, 1, -1]])

@@ -47,12 +47,26 @@ def test_invalid_cage_gives_the_error_message_of_the_command(tmp_path):
         (lambda: pull([[0, 1, 2]]), cw.PullError, "there is no vertex 1: indices run from 0 to 0"),
         (lambda: cw.reshape(b"no model", CUBE, CUBE.vertices), cw.ModelError, "model"),
         (lambda: cw.reshape("missing.glb", CUBE, CUBE.vertices), FileNotFoundError, "missing.glb"),
+        (lambda: cw.reshape(7, CUBE, CUBE.vertices), TypeError, "model: expected a path or bytes, got int"),
+        (lambda: cw.read_model([b"", None]), TypeError, "model: expected a path or bytes, got NoneType"),
+        (lambda: cw.transfer(b"", 1.5), TypeError, "clothes: expected a path or bytes, got float"),
         (lambda: cw.reshape(b"", CUBE, CUBE.vertices, joints="run"), cw.OptionError, "joints: .run"),
     ],
 )
 def test_errors_have_their_class_and_the_message_of_the_core(call, kind, message):
     with pytest.raises(kind, match=message):
         call()
+
+
+def test_whole_floats_and_scalars_of_numpy_are_options():
+    expected = cw.bind(POINT, CUBE, grid=8, tau=1.0)[0]
+    for grid, tau in [(8.0, np.float32(1)), (np.float64(8), 1), (np.int32(8), np.int64(1))]:
+        assert abs(cw.bind(POINT, CUBE, grid=grid, tau=tau)[0] - expected).max() == 0
+    vertices, triangles = box_triangles()
+    for quads in [True, False]:
+        options = {"target": 20, "quads": np.bool_(quads)}
+        made = cw.generate_cage(vertices, triangles, **options)
+        assert np.array_equal(made.vertices, cw.generate_cage(vertices, triangles, target=20, quads=quads).vertices)
 
 
 def test_all_errors_have_a_common_base_class():

@@ -11,7 +11,7 @@ __version__: str
 
 _Faces = ArrayLike | Sequence[ArrayLike]
 _Progress = Callable[[float], object] | None
-_Model = str | PathLike[str] | bytes
+_Model = str | PathLike[str] | bytes | bytearray | memoryview
 
 class BindOptions(TypedDict, total=False):
     grid: int
