@@ -164,9 +164,9 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
             // If the model was not read because it is large or has an error, read it now.
             let ahead = reading.take().and_then(|thread| thread.join().ok()?.ok());
             let read = ahead.map_or_else(|| ReadModel::new(job, args, has_moves, memory), Ok);
-            let next = (k + 1..jobs.len()).find(|&k| !done[k]);
+            let next = (k + 1..jobs.len()).find(|&k| !done[k]).map(|k| &jobs[k]);
             let little = memory.divided(PARALLEL_MEMORY_DIVISOR);
-            reading = next.map(|next| scope.spawn(|| ReadModel::new(&jobs[next], args, has_moves, little)));
+            reading = next.map(|job| scope.spawn(move || ReadModel::new(job, args, has_moves, little)));
             let deformed = read.and_then(|read| binder.refit(job, read, &poses, inner));
             settle_one(&mut writing, &mut settle)?;
             match deformed {
