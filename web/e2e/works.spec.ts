@@ -81,10 +81,11 @@ test("changed work is saved before another model opens, listed, restored and del
     const posed = await cagePositions(page);
     await expect.poll(() => savedSince(page, before, "workA")).toBe(true);
     await work(page, "workB");
-    const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
+    // A similar message about the clamp may still be visible.
+    const text = "Your work on workA.obj is kept in this browser.";
+    const kept = page.locator("#toasts .toast", { hasText: text });
     await expect(kept).toBeVisible();
-    // A similar message about the clamp may still be visible, so use the button next to the message about workA.
-    await kept.locator("..").getByRole("button", { name: "Bring it back" }).click();
+    await kept.getByRole("button", { name: "Bring it back" }).click();
     await expect(page).toHaveTitle(/workA/);
     await bound(page);
     expect(largestMove(posed, await cagePositions(page)), "with its pose").toBeLessThan(1e-3);
