@@ -26,11 +26,6 @@ impl MemoryArgs {
     pub(crate) fn bytes(self) -> u64 {
         self.memory_limit << 20
     }
-
-    /// Divides the memory limit.
-    pub(crate) fn divided(self, by: u64) -> Self {
-        Self { memory_limit: self.memory_limit / by }
-    }
 }
 
 /// Arguments of the solver. All commands that bind share them.

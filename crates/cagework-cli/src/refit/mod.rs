@@ -17,7 +17,7 @@ use cagework_core::{Binding, Controls};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown};
 use glam::{DVec3, Vec3};
 
-use crate::args::{MemoryArgs, ModelOutput, RefitArgs, SizeArgs};
+use crate::args::{ModelOutput, RefitArgs, SizeArgs};
 use crate::bind::{bind_positions, check_memory};
 use crate::controls::with_inner;
 use crate::deform::{Deformation, Poses, pose_name};
@@ -53,23 +53,6 @@ struct Binder<'a> {
     unnamed: RefCell<Vec<String>>,
 }
 
-/// A model that was read, and the time this took.
-struct ReadModel {
-    model: Model,
-    read_ms: f64,
-}
-
-impl ReadModel {
-    /// Reads the model of a job; its clips, too, if the skeleton that all models share has moving joints.
-    fn new(job: &Job, args: &RefitArgs, has_moves: bool, memory: MemoryArgs) -> Result<Self, CliError> {
-        let started = Instant::now();
-        let has_clips = has_moves && job.output.format == ModelFormat::Gltf;
-        let load = if has_clips { load_with_clips } else { load_model };
-        let model = load(&job.model, args.read.axis(), memory)?;
-        Ok(Self { model, read_ms: elapsed_ms(started) })
-    }
-}
-
 /// A deformed model that is ready to be written.
 struct DeformedModel<'a> {
     job: &'a Job,
@@ -84,8 +67,7 @@ struct DeformedModel<'a> {
 /// The job that another thread is writing, and the handle of that thread; `None` if no job is being written.
 type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
 
-/// While a model is bound, the previous one is written and the next one is read, unless that needs more than the memory
-/// limit divided by this.
+/// A model is written while the next one is read, unless writing it needs more than the memory limit divided by this.
 const PARALLEL_MEMORY_DIVISOR: u64 = 16;
 
 /// Runs `cagework refit`.
@@ -132,14 +114,6 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let mut binder =
         Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), skeleton: None, unnamed };
     binder.skeleton = binder.skeleton_of(&jobs, &poses)?.map(Arc::new);
-    let done: Vec<bool> = jobs
-        .iter()
-        .map(|job| {
-            let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
-            args.resume && is_newer(&job.output.path, &inputs)
-        })
-        .collect();
-    let has_moves = binder.skeleton.as_ref().is_some_and(|skeleton| skeleton.has_moves());
     let mut models = Vec::with_capacity(jobs.len());
     let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
         // If a signal cancelled a model, do not report it as failed.
@@ -154,24 +128,15 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     };
     std::thread::scope(|scope| {
         let mut writing = None;
-        let mut reading: Option<ScopedJoinHandle<'_, Result<ReadModel, CliError>>> = None;
-        for (k, job) in jobs.iter().enumerate().take_while(|_| !signals::cancelled()) {
-            if done[k] {
-                settle_one(&mut writing, &mut settle)?;
-                settle(job, Outcome::Skipped)?;
-                continue;
-            }
-            // If the model was not read because it is large or has an error, read it now.
-            let ahead = reading.take().and_then(|thread| thread.join().ok()?.ok());
-            let read = ahead.map_or_else(|| ReadModel::new(job, args, has_moves, memory), Ok);
-            let next = (k + 1..jobs.len()).find(|&k| !done[k]).map(|k| &jobs[k]);
-            let little = memory.divided(PARALLEL_MEMORY_DIVISOR);
-            reading = next.map(|job| scope.spawn(move || ReadModel::new(job, args, has_moves, little)));
-            let deformed = read.and_then(|read| binder.refit(job, read, &poses, inner));
+        for job in jobs.iter().take_while(|_| !signals::cancelled()) {
+            let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
+            let is_done = args.resume && is_newer(&job.output.path, &inputs);
+            let deformed = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
             settle_one(&mut writing, &mut settle)?;
             match deformed {
-                Err(error) => settle(job, Outcome::of_error(&error, &job.model))?,
-                Ok(deformed) => {
+                None => settle(job, Outcome::Skipped)?,
+                Some(Err(error)) => settle(job, Outcome::of_error(&error, &job.model))?,
+                Some(Ok(deformed)) => {
                     let is_large = deformed.bytes() > args.read.memory.bytes() / PARALLEL_MEMORY_DIVISOR;
                     let names = &poses.names;
                     writing = Some((job, scope.spawn(move || deformed.write(names, args.size))));
@@ -253,17 +218,14 @@ fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
 }
 
 impl Binder<'_> {
-    /// Binds and deforms a model.
-    fn refit<'j>(
-        &self,
-        job: &'j Job,
-        ReadModel { mut model, read_ms }: ReadModel,
-        poses: &Poses,
-        inner: &[Vec3],
-    ) -> Result<DeformedModel<'j>, CliError> {
+    /// Reads, binds and deforms a model.
+    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<DeformedModel<'j>, CliError> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
         let (path, format) = (&job.model, job.output.format);
+        let has_moves = self.skeleton.as_ref().is_some_and(|skeleton| skeleton.has_moves());
+        let load = if has_moves && format == ModelFormat::Gltf { load_with_clips } else { load_model };
+        let mut model = load(path, args.read.axis(), args.read.memory)?;
         model.see_from(self.origin);
         if model.positions.is_empty() {
             return self.of_clips(job, model, started);
@@ -302,7 +264,7 @@ impl Binder<'_> {
             outside_vertices: report.outside_vertices as usize,
             bind_ms: report.timings_ms.total,
             deform_ms,
-            total_ms: read_ms,
+            total_ms: 0.0,
             rig: None,
             notices,
         };
@@ -437,7 +399,7 @@ impl DeformedModel<'_> {
             Ok(rig) => {
                 report.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
                 report.notices.extend(model.lost_in(job.output.format));
-                report.total_ms += elapsed_ms(started);
+                report.total_ms = elapsed_ms(started);
                 Outcome::Written(Box::new(ModelReport { rig, ..report }))
             }
         }
