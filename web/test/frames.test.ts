@@ -53,10 +53,10 @@ describe("frames", () => {
 
   it("nothing is sharpened while a pointer is pressed", () => {
     const { drawn, pointers } = slow((sharp) => sharp);
-    pointers.dispatchEvent(new Event("pointerdown"));
+    pointers.dispatchEvent(Object.assign(new Event("pointerdown"), { buttons: 1 }));
     vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([false]);
-    pointers.dispatchEvent(new Event("pointerup"));
+    pointers.dispatchEvent(Object.assign(new Event("pointermove"), { buttons: 0 }));
     vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([false, true]);
   });

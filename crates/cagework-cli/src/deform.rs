@@ -78,12 +78,12 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         });
     }
     if is_capture {
-        let why = "splats and points have no rig, and no parts, and each moves by itself";
-        args.rig.refuse(true, why, "leave it out: only meshes with faces take it")?;
+        let why = "this option needs a mesh: splats and points have neither joints nor parts";
+        args.rig.refuse(true, why, "leave the option out")?;
     }
     if args.lattice.is_some() {
-        let why = "a lattice covers the space in the cage and has no rig and no parts";
-        let hint = "leave it out, or write the model and the lattice in two runs";
+        let why = "this option changes a model, but a lattice stores how the space inside the cage moves";
+        let hint = "leave the option out, or write the model and the lattice in two runs";
         args.rig.refuse(args.output.is_none(), why, hint)?;
     }
     let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;

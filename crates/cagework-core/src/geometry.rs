@@ -109,7 +109,8 @@ pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -
 }
 
 /// Computes the winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1
-/// inside (also of a solid with cavities), 0 outside, in between on the surface. For other triangles: their share of it.
+/// inside (also of a solid with cavities), 0 outside, in between on the surface. For an open set: the solid angle that it
+/// covers, divided by that of a sphere.
 ///
 /// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle". Each half solid angle is the argument
 /// of a complex number. The product of these numbers has the sum of the angles as its argument, apart from full turns,

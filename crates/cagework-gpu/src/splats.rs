@@ -119,7 +119,7 @@ pub fn sort_splats(centers: &[Vec3], depths: &Depths) -> Vec<u32> {
 /// Fourth entry of the first row of a floater. Kernels add a number between -1 and 1.
 pub const FLOATER: f32 = 4.0;
 
-/// Entry that kernels add to the first entry of the turn of a mirrored splat.
+/// Number that kernels add to the first entry of the turn of a mirrored splat.
 pub const MIRROR: f32 = 4.0;
 
 /// Splats as rows for kernels: position, 0 or [`FLOATER`], covariance (xx, xy, xz, yy, yz, zz), padding. `floaters`: the

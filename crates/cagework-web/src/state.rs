@@ -42,7 +42,8 @@ pub(crate) struct State {
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
     /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
-    /// Parts of the models that stay in place or are rigid, prepared for the current weights; `None` if there are none.
+    /// Parts of the models that stay in place or are rigid, prepared for the current weights. `None` if all vertices
+    /// follow the cage.
     parts: Option<Arc<BoundParts>>,
     /// Cached weights for documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,

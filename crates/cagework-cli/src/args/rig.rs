@@ -119,7 +119,7 @@ impl RigArgs {
     /// `of_rig`: also rejects options that only change skeletons and clips. `why`: the reason, as a sentence.
     ///
     /// # Errors
-    /// If such an option is given.
+    /// If one of these options is given.
     pub(crate) fn refuse(&self, of_rig: bool, why: &str, hint: &'static str) -> Result<(), CliError> {
         let given = [
             ("--ground", self.ground),

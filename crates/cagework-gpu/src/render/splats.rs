@@ -101,7 +101,7 @@ impl SplatLayer {
         pass.set_bind_group(0, camera_group, &[]);
         pass.set_bind_group(1, &self.group, &[]);
         pass.set_pipeline(pipeline);
-        // One instance, as in `Overlay::draw`.
+        // One instance of many vertices: see `Overlay::draw_vertices`.
         pass.draw(0..6 * self.mover.len() as u32, 0..1);
         self.drawn = Some((view, hides));
     }

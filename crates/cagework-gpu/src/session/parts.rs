@@ -64,7 +64,8 @@ impl Session {
         Some(positions)
     }
 
-    /// The parts that stay in place or are rigid, prepared for the current weights; `None` if there are none.
+    /// Parts that stay in place or are rigid, prepared for the current weights. `None` without weights, or if all
+    /// vertices follow the cage.
     #[must_use]
     pub fn bound_parts(&self) -> Option<Arc<BoundParts>> {
         self.bound.as_ref()?.parts.clone()

@@ -15,10 +15,11 @@ export function createFrames(pointers: EventTarget) {
   let quiet: ReturnType<typeof setTimeout> | undefined;
   const stop = new AbortController();
   let pressed = false;
-  for (const type of ["pointerdown", "pointerup", "pointercancel"]) {
-    const follow = () => {
-      pressed = type === "pointerdown";
-    };
+  const follow = (event: Event) => {
+    pressed = (event as PointerEvent).buttons !== 0;
+  };
+  // A release outside the window is not reported: the next movement shows it.
+  for (const type of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {
     pointers.addEventListener(type, follow, { capture: true, passive: true, signal: stop.signal });
   }
 
