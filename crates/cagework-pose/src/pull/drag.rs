@@ -298,7 +298,7 @@ fn check(
         check_index("vertex of the model", grip.seed, pull.n_vertices)?;
         if grip.row.len() != pull.n_cage() {
             let (rows, columns, vertices) = (1, grip.row.len(), 1);
-            return Err(PullError::Shape { rows, columns, vertices, cage: pull.n_cage() });
+            return Err(PullError::Shape { rows, columns, vertices, controls: pull.n_cage() });
         }
         if let Some(&value) = grip.row.iter().find(|w| !w.is_finite()) {
             return Err(PullError::Value { what: "a weight", value, range: "finite" });

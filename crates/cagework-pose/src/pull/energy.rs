@@ -52,7 +52,7 @@ impl Pull {
         let (n, cage) = (controls.n_controls(), controls.cage());
         let (rows, columns, vertices) = (weights.n_rows(), weights.n_columns(), probes.points().len());
         if (rows, columns) != (vertices, n) {
-            return Err(PullError::Shape { rows, columns, vertices, cage: n });
+            return Err(PullError::Shape { rows, columns, vertices, controls: n });
         }
         let size = Bounds::of(&mesh.positions).ok_or(PullError::Empty)?.diagonal();
         // A model that is a single point has no size: use the cage's.

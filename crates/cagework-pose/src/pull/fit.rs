@@ -7,7 +7,7 @@ use super::anderson::Anderson;
 use super::drag::{CAGE_WEIGHT, REGULARISATION, flat};
 use super::energy::Pull;
 use super::frame::turned;
-use super::{MAX_CAGE, PullError};
+use super::{MAX_CONTROLS, PullError};
 use crate::parts::Motion;
 use cagework_core::weights::Weights;
 
@@ -15,8 +15,10 @@ use cagework_core::weights::Weights;
 /// smallest value, targets without noise are met within 1e-5 of the model's size.
 const LAMBDA_RANGE: [f64; 2] = [1e-10, 1e-2];
 
-/// Limit on the rounds that estimate lambda, and the ratio of successive values below which the estimate has converged.
+/// Limit on the rounds that estimate lambda.
 const MAX_LAMBDA_ROUNDS: usize = 8;
+
+/// The estimate of lambda has converged if successive values differ by less than this factor.
 const LAMBDA_RATIO: f64 = 1.1;
 
 /// Smallest number of points per cage vertex with which the noise can be estimated.
@@ -26,9 +28,10 @@ const MIN_POINTS_PER_VERTEX: usize = 4;
 /// the model bends as little as possible between them.
 const LANDMARK_LAMBDA: f64 = 1e-5;
 
-/// Limit on local-global steps, and the movement of the cage in a step, as a fraction of the model's size, at which
-/// they stop.
+/// Limit on local-global steps.
 const MAX_STEPS: usize = 2000;
+
+/// Local-global steps stop when the cage moves by less than this in a step, as a fraction of the model's size.
 const MIN_STEP_MOVE: f64 = 1e-8;
 
 /// Options of [`Pull::fit`].
@@ -86,8 +89,9 @@ impl Pull {
     /// `weights`: rows of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight `m_k` of each point,
     /// scaled to sum to 1; a point with the share 0 is ignored. `to`: targets, object units.
     ///
-    /// # Errors [`PullError`]: the weights belong to another cage, lengths differ, no point has a target, or numbers
-    /// are out of range.
+    /// # Errors
+    /// [`PullError`]: the weights belong to another cage, lengths differ, no point has a target, or numbers are out of
+    /// range.
     pub fn fit(
         &self,
         weights: &Weights,
@@ -130,11 +134,11 @@ impl Pull {
         to: &'a [Vec3],
     ) -> Result<Goals<'a>, PullError> {
         let (rows, columns, n) = (weights.n_rows(), weights.n_columns(), self.n_cage());
-        if n > MAX_CAGE {
-            return Err(PullError::Cage { cage: n });
+        if n > MAX_CONTROLS {
+            return Err(PullError::Controls { controls: n });
         }
         if columns != n || shares.len() != rows {
-            return Err(PullError::Shape { rows, columns, vertices: shares.len(), cage: n });
+            return Err(PullError::Shape { rows, columns, vertices: shares.len(), controls: n });
         }
         if to.len() != rows {
             return Err(PullError::Targets { given: to.len(), points: rows });

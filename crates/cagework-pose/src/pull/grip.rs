@@ -48,10 +48,10 @@ impl Grip {
         triangles: &[[u32; 3]],
         weights: &Weights,
     ) -> Result<Self, PullError> {
-        let (rows, columns, vertices, cage) =
+        let (rows, columns, vertices, controls) =
             (weights.n_rows(), weights.n_columns(), pull.n_vertices, pull.n_cage());
-        if (rows, columns) != (vertices, cage) {
-            return Err(PullError::Shape { rows, columns, vertices, cage });
+        if (rows, columns) != (vertices, controls) {
+            return Err(PullError::Shape { rows, columns, vertices, controls });
         }
         match handle {
             Handle::Vertex(v) => {
@@ -68,7 +68,7 @@ impl Grip {
                 }
                 let corners = triangles[t as usize];
                 let rows = corners.map(|v| dense(weights, v as usize));
-                let row = (0..cage).map(|i| (0..3).map(|k| bary[k] * rows[k][i]).sum()).collect();
+                let row = (0..controls).map(|i| (0..3).map(|k| bary[k] * rows[k][i]).sum()).collect();
                 let most = (0..3).max_by(|&a, &b| bary[a].total_cmp(&bary[b])).unwrap_or(0);
                 Ok(Self::of_row(row, corners[most]))
             }

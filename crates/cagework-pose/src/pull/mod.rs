@@ -43,8 +43,9 @@ pub use samples::Probes;
 /// Limit on grabs and pins together, because a drag inverts a dense matrix of that size.
 pub const MAX_HANDLES: usize = 200;
 
-/// Limit on cage vertices, because the matrices are dense and every frame multiplies by them.
-pub const MAX_CAGE: usize = 1000;
+/// Limit on controls (cage vertices and inner controls), because the matrices are dense and every frame multiplies by
+/// them.
+pub const MAX_CONTROLS: usize = 1000;
 
 /// Why a pull or a fit failed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -54,7 +55,7 @@ pub enum PullError {
     Empty,
     /// The weights belong to another model or cage.
     #[error(
-        "the weights are for {rows} model vertices and {columns} cage vertices, but the model has {vertices} and the cage {cage}: \
+        "the weights are for {rows} model vertices and {columns} controls, but the model has {vertices} and the cage {controls}: \
      bind this model to this cage"
     )]
     Shape {
@@ -64,14 +65,17 @@ pub enum PullError {
         columns: usize,
         /// Number of vertices of the model.
         vertices: usize,
-        /// Number of vertices of the cage.
-        cage: usize,
+        /// Number of controls: vertices of the cage and inner controls.
+        controls: usize,
     },
-    /// The cage is too large.
-    #[error("the cage has {cage} vertices; at most {MAX_CAGE} can be pulled: make a coarser cage")]
-    Cage {
-        /// Number of vertices of the cage.
-        cage: usize,
+    /// There are too many controls.
+    #[error(
+        "the cage has {controls} controls (its vertices and the controls inside); a pull or fit takes at most \
+         {MAX_CONTROLS}: make a coarser cage"
+    )]
+    Controls {
+        /// Number of controls: vertices of the cage and inner controls.
+        controls: usize,
     },
     /// A handle does not exist.
     #[error("there is no {what} {index}: indices run from 0 to {last}")]

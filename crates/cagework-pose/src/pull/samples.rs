@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 use nalgebra::DMatrix;
 
-use super::{MAX_CAGE, PullError};
+use super::{MAX_CONTROLS, PullError};
 use cagework_core::controls::Controls;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::weights::Weights;
@@ -41,11 +41,11 @@ impl Probes {
     /// Samples `mesh`. `controls`: the controls at rest.
     ///
     /// # Errors
-    /// [`PullError::Empty`], [`PullError::Cage`], or [`PullError::Missing`] if a triangle has an invalid corner.
+    /// [`PullError::Empty`], [`PullError::Controls`], or [`PullError::Missing`] if a triangle has an invalid corner.
     pub fn new<'a>(mesh: &TriMesh, controls: impl Into<Controls<'a>>) -> Result<Self, PullError> {
         let controls = controls.into();
-        if controls.n_controls() > MAX_CAGE {
-            return Err(PullError::Cage { cage: controls.n_controls() });
+        if controls.n_controls() > MAX_CONTROLS {
+            return Err(PullError::Controls { controls: controls.n_controls() });
         }
         let cage = controls.cage();
         let positions = &mesh.positions;
