@@ -17,14 +17,17 @@ use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::timeline::Timeline;
 
-// Limits on the frames of a clip that a generated cage encloses: on their number, and on the vertices of all frames.
-const MAX_CLIP_FRAMES: usize = 32;
-const MAX_FRAME_VERTICES: usize = 1 << 24;
+/// Limit on the times of a clip at which a generated cage encloses the model.
+const MAX_CLIP_TIMES: usize = 32;
+/// Limit on the vertices at all these times together. Models with more than 524,288 vertices are enclosed at fewer
+/// times.
+const MAX_CLIP_VERTICES: usize = 1 << 24;
 
-/// Sampling rate of baked clips, and limit on their number of frames. Each frame becomes a morph target, of which game
-/// engines support only a limited number.
+/// Limit on the frames of a baked clip per second.
 const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
-const MAX_BAKED_FRAMES: f32 = 60.0;
+/// Limit on the number of frames of a baked clip. Each frame becomes a morph target, of which game engines support only
+/// a limited number.
+const MAX_BAKED_FRAMES: usize = 60;
 /// Limit on the positions and normals of all baked frames, bytes.
 const MAX_BAKED_BYTES: u64 = 512 << 20;
 
@@ -262,7 +265,8 @@ impl Model {
     }
 
     /// Returns the vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
-    /// weights 0 and 1, and frames of a clip. For splats and points, octahedra around them.
+    /// weights 0 and 1, and the shapes at up to 32 equally spaced times of a clip (fewer, but at least two, above
+    /// 524,288 vertices). For splats and points, octahedra around them.
     ///
     /// # Errors
     /// [`UnknownClip`] if there is no such clip. If the rig cannot be read, the result contains the rest shape only.
@@ -284,7 +288,7 @@ impl Model {
             return Ok((positions, triangles));
         };
         let number = Clip::named(player.clips(), asked)?;
-        let n = (MAX_FRAME_VERTICES / self.positions.len().max(1)).clamp(2, MAX_CLIP_FRAMES);
+        let n = (MAX_CLIP_VERTICES / self.positions.len().max(1)).clamp(2, MAX_CLIP_TIMES);
         for at in self.frames_of(&player, number, n) {
             if at.iter().all(|p| p.is_finite()) {
                 let first = positions.len() as u32;
@@ -330,12 +334,12 @@ impl Model {
         let player = self.player()?.ok_or(WriteError::NoRig)?;
         let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
         // A clip of length 0 has one frame, because the times of keys must increase.
-        let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(0.0, MAX_BAKED_FRAMES) as usize + 1;
+        let n = ((found.seconds * BAKED_FRAMES_PER_SECOND).ceil() as usize).min(MAX_BAKED_FRAMES - 1) + 1;
         // The position and the normal of a vertex take 24 bytes.
         let needed = (n * self.positions.len() * 24) as u64;
         if needed > MAX_BAKED_BYTES {
             return Err(WriteError::Document(format!(
-                "{n} frames of {} vertices are {} MB, above the limit of {} MB for a baked clip: export the clip without \
+                "{n} frames of {} vertices are {} MiB, above the limit of {} MiB for a baked clip: export the clip without \
                  dynamic bending",
                 self.positions.len(),
                 needed >> 20,

@@ -108,6 +108,28 @@ fn baked_clip_shows_its_frames() {
     assert_eq!(model.frames(7).unwrap_err(), WriteError::NoClip(7));
 }
 
+/// Clips of more than two seconds have 60 frames, the last at the clip's end.
+#[test]
+fn long_clip_is_baked_to_sixty_frames() {
+    let mut rig = rigged();
+    let (end, n) = (10.0_f32, 2);
+    let times: Vec<u8> = [0.0, end].into_iter().flat_map(f32::to_le_bytes).collect();
+    let input = rig.accessor(&times, common::F32, n, "SCALAR");
+    rig.json["accessors"][input]["min"] = serde_json::json!([0.0]);
+    rig.json["accessors"][input]["max"] = serde_json::json!([end]);
+    let values: Vec<u8> = [0.0_f32, 0., 0., 0., 1., 0.].into_iter().flat_map(f32::to_le_bytes).collect();
+    let output = rig.accessor(&values, common::F32, n, "VEC3");
+    rig.json["animations"] = serde_json::json!([{
+        "name": "rise",
+        "samplers": [{ "input": input, "output": output }],
+        "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } }],
+    }]);
+    let model = read(&rig.glb());
+    let frames = model.frames(0).unwrap();
+    assert_eq!(frames.len(), 60);
+    assert_near(&frames[59], &shown(&player(&model), Some(0), end, &[]), ROUNDING_TOLERANCE, "at the end");
+}
+
 /// Two channels with a missing sampler must stay unchanged. Indexing the JSON would add null members.
 #[test]
 fn channels_with_a_missing_sampler_stay_unchanged() {
