@@ -1,5 +1,6 @@
 //! Options of a bind: names, values, ranges and defaults, for the command, the page and the packages.
 
+use std::fmt::Display;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -216,7 +217,7 @@ pub const GRID: Number = Number {
 /// The `tau` option: convergence threshold for delta ([`crate::solve::stop`]).
 pub const TAU: Number = Number {
     name: "tau",
-    help: "Stop when delta falls below this (the paper's Eq. 2; for multigrid and cg the estimated remaining error)",
+    help: "Stop when delta falls below this (equation 2 of K. Smith's paper; for multigrid and cg the estimated remaining error)",
     unit: "fraction of the range of weights",
     allowed: "a number above 0",
     is_allowed: |tau| tau.is_finite() && tau > 0.0,
@@ -273,9 +274,9 @@ impl Number {
     ///
     /// # Errors
     /// [`RangeError`] if the value is not allowed.
-    pub fn check(&self, value: impl Into<f64>) -> Result<(), RangeError> {
-        let value = value.into();
-        if (self.is_allowed)(value) { Ok(()) } else { Err(self.refuse(&value.to_string())) }
+    pub fn check(&self, value: impl Into<f64> + Display + Copy) -> Result<(), RangeError> {
+        // Displayed as the given type: the f32 next to 0.1 has more digits as f64.
+        if (self.is_allowed)(value.into()) { Ok(()) } else { Err(self.refuse(&value.to_string())) }
     }
 
     /// Parses and checks a value.
@@ -283,8 +284,8 @@ impl Number {
     /// # Errors
     /// [`RangeError`] if the value is not allowed, or if the text is not a number of type `T`.
     pub fn parse<T: FromStr + Into<f64> + Copy>(&self, text: &str) -> Result<T, RangeError> {
-        let value: T = text.parse().map_err(|_| self.refuse(text))?;
-        self.check(value).map(|()| value)
+        let value = text.parse().ok().filter(|&value: &T| (self.is_allowed)(value.into()));
+        value.ok_or_else(|| self.refuse(text))
     }
 
     fn refuse(&self, value: &str) -> RangeError {
@@ -315,13 +316,14 @@ pub struct BindOptions {
     /// Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
     /// of the other solvers. Default 1e-5.
     pub tau: f32,
-    /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
+    /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles, and steps with a V-cycle in each,
+    /// also stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
     pub max_iterations: u32,
     /// Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
     /// restored. 0 drops none. Default 0.
     pub sparsify: f32,
     /// Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
-    /// exceed this. Default 4 GiB; 2 GiB in wasm.
+    /// exceed this. Default 4 GiB; on the page and in the npm package 2 GiB.
     pub memory_limit: u64,
     /// Treatment of vertices outside the cage. Default extend.
     pub outside: OutsidePolicy,
@@ -415,7 +417,12 @@ mod tests {
         assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());
         assert_eq!(GRID.about(), "Cells along the longest side of the cage: a whole number from 8 to 512");
-        assert!(BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().is_err());
+        let sparse = BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().unwrap_err();
+        assert_eq!(
+            sparse.to_string(),
+            "sparsify is 0.1; it must be 0 (keep all weights) or a threshold below 0.1"
+        );
+        assert_eq!(SPARSIFY.parse::<f32>("0.10").unwrap_err().value, "0.10");
     }
 
     #[test]

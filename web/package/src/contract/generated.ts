@@ -38,7 +38,8 @@ delta_norm: DeltaNorm,
  */
 tau: number,
 /**
- * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles, and steps with a V-cycle in each,
+ * also stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
  */
 max_iterations: number,
 /**
@@ -48,7 +49,7 @@ max_iterations: number,
 sparsify: number,
 /**
  * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
- * exceed this. Default 4 GiB; 2 GiB in wasm.
+ * exceed this. Default 4 GiB; on the page and in the npm package 2 GiB.
  */
 memory_limit: number,
 /**
