@@ -80,7 +80,8 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Time the published method and the default method, on one thread and on all threads.
     Bench(BenchArgs),
-    /// Repeat the paper's evaluation: times, errors and reconstructions, as CSV, SVG, GLB and a text report.
+    /// Repeat the evaluation of K. Smith's paper, which describes the published method: times, errors and reconstructions,
+    /// as CSV, SVG, GLB and a text report.
     Evaluate(EvaluateArgs),
     /// Bind and deform the built-in sample.
     Demo(DemoArgs),
@@ -104,7 +105,7 @@ pub(crate) struct InfoArgs {
     cagework bind horse.glb --cage cage.obj -g 128 --sparsify 1e-5 --report horse.json\n  \
     cagework bind horse.obj --cage auto:80 --save-cage cage.obj -o rest.glb\n  \
     cagework bind horse.glb --cage cage.obj --smooth 2 --controls spine.obj --weights horse.npz\n  \
-    cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's algorithm)")]
+    cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the published algorithm)")]
 pub(crate) struct BindArgs {
     /// Mesh to bind.
     #[arg(help = mesh_help("Mesh to bind"))]
@@ -249,9 +250,10 @@ pub(crate) struct DeformArgs {
     \"relax\": 0.5, \"frames\": 30}\n\n\
     A grab or pin is a vertex of the model (for splats and points, the number of one of them, from 0), a point of a \
     triangle, or a vertex of the cage. Only \"grabs\" is \
-    required.\n\"reach\": how far along the surface the model follows: null for automatic, a fraction of the model's diagonal, or \
-    \"all\".\n\"start\": the initial pose; the default is the cage at rest. \"relax\": 0 keeps the details of the initial pose, \
-    1 restores those of the rest shape.\n\n\
+    required.\n\"reach\": how far along the surface the model follows: null for automatic (default), a fraction of the model's \
+    diagonal, or \"all\".\n\"start\": the initial pose; the default is the cage at rest.\n\"relax\": 0 keeps the details of the \
+    initial pose, 1 restores those of the rest shape; the default is 0.5.\n\"frames\": number of steps in which the grabs move \
+    to their targets, 1 to 10,000; the default is 30.\n\n\
     Example:\n  cagework pull horse.glb --cage cage.obj --weights horse.npz --job rear.json -o rear.obj"
 )]
 pub(crate) struct PullArgs {
@@ -360,7 +362,10 @@ fn number<T>(option: Number) -> impl TypedValueParser<Value = T>
 where
     T: FromStr + Into<f64> + Copy + Send + Sync + 'static,
 {
-    StringValueParser::new().try_map(move |text| option.parse::<T>(&text))
+    // Without the option's name, which is that of the library: clap puts the command's name in front.
+    StringValueParser::new().try_map(move |text| {
+        option.parse::<T>(&text).map_err(|wrong| format!("it must be {}", wrong.allowed))
+    })
 }
 
 fn positive(text: &str) -> Result<f32, String> {

@@ -48,6 +48,7 @@ struct CageInput {
 /// # Errors
 /// If a model cannot be read, or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
+    args.check()?;
     let around = enclosed(args)?;
     let mut summary = CageSummary {
         output: args.output.path.display().to_string(),

@@ -13,7 +13,7 @@ use crate::args::DemoArgs;
 use crate::bind::{bind_model, deform};
 use crate::card;
 use crate::error::CliError;
-use crate::files::{json, make_folder, print, write};
+use crate::files::{json, make_folder, print, shown_path, write};
 use crate::load::{BuiltInSample, built_in};
 
 /// Output of `--json`.
@@ -97,6 +97,11 @@ impl Files<'_> {
     }
 }
 
+/// Name or path by which the running command was called.
+fn command() -> String {
+    std::env::args_os().next().map_or_else(|| "cagework".to_owned(), |path| shown_path(Path::new(&path)))
+}
+
 fn text(
     folder: &Path,
     sample: &str,
@@ -111,14 +116,14 @@ fn text(
          harmonic coordinates in {}, and posed the cage. Total time: {}.\n\n\
          {}\n\
          {} shows all poses as an animation. Next, edit a pose in a 3-D program (keep its vertices) and apply it:\n  \
-         cagework deform {} --cage {} --weights {} --pose {} -o {}\n\
-         (the command is target/release/cagework).",
+         {} deform {} --cage {} --weights {} --pose {} -o {}",
         report.vertices,
         report.cage_vertices,
         card::duration(report.timings_ms.total),
         card::duration(total_ms),
         card::of(report, &[], written),
         at("poses.glb"),
+        command(),
         at(&format!("{sample}.obj")),
         at("cage.obj"),
         at("weights.npz"),

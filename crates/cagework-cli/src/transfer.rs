@@ -1,6 +1,6 @@
 //! `cagework transfer`: gives clothes the skeleton, the joint weights and the morph targets of a body.
 
-use cagework_io::{TransferOptions, TransferReport, shown, transfer_report};
+use cagework_io::{TransferError, TransferOptions, TransferReport, shown, transfer_report};
 use serde::Serialize;
 
 use crate::args::TransferArgs;
@@ -26,9 +26,12 @@ pub(crate) fn run(args: &TransferArgs, as_json: bool) -> Result<(), CliError> {
     let [body, clothes] = [load_model(&args.body, up, memory)?, load_model(&args.clothes, up, memory)?];
     let options = TransferOptions { push_out: args.push_out, memory_limit: memory.bytes() };
     let done = clothes.transfer_from(&body, &options);
-    let (glb, report) = done.map_err(|e| CliError::Mismatch {
-        message: e.to_string(),
-        hint: "`cagework info` describes both files; the memory limit is set by --memory-limit, in MiB",
+    let (glb, report) = done.map_err(|error| {
+        let hint = match &error {
+            TransferError::Memory(_) => "the limit is set by --memory-limit, in MiB",
+            _ => "`cagework info` describes both files",
+        };
+        CliError::Mismatch { message: error.to_string(), hint }
     })?;
     write(&args.output, &glb)?;
     let output = args.output.display().to_string();

@@ -9,10 +9,11 @@ use cagework_cage::generate::{
     TARGET, VOXELS,
 };
 use cagework_core::BindOptions;
-use cagework_core::options::{GRID, RangeError};
+use cagework_core::options::{GRID, Number};
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
+use crate::error::CliError;
 
 /// Arguments of `cagework cage`.
 #[derive(Args, Debug)]
@@ -53,12 +54,12 @@ pub(crate) struct CageArgs {
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
-    /// Enclose every frame of the clip with this name as well, in each model that has it.
+    /// Enclose the model at up to 32 equally spaced times of the clip with this name as well, in each model that has it.
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
     #[arg(long, help = DIVISIONS.about(), value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
     pub(crate) divisions: Option<u32>,
-    /// Distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
+    /// Distance between the model and a box cage (--kind box), as a fraction of the diagonal of the model's bounding box.
     #[arg(long, default_value_t = BOX_MARGIN, value_name = "FRACTION", value_parser = positive)]
     pub(crate) margin: f32,
 }
@@ -68,6 +69,45 @@ impl CageArgs {
     pub(crate) fn kind(&self) -> KindArg {
         let guess = if self.divisions.is_some() { KindArg::Box } else { KindArg::Auto };
         self.kind.unwrap_or(guess)
+    }
+
+    /// Rejects options that the kind of cage does not use.
+    ///
+    /// # Errors
+    /// If one of these options is given and is not the default.
+    pub(crate) fn check(&self) -> Result<(), CliError> {
+        let usual = CageOptions::default();
+        let of_box = [
+            ("--divisions", self.divisions.is_some()),
+            ("--margin", self.margin.to_bits() != BOX_MARGIN.to_bits()),
+        ];
+        let of_others = [
+            ("--vertices", self.vertices.is_some()),
+            ("--detail", self.detail.to_bits() != usual.detail.to_bits()),
+            ("--triangles", self.triangles),
+            ("--symmetry", self.symmetry != usual.symmetry),
+            ("--per-component", self.per_component),
+            ("--clearance", self.clearance.to_bits() != usual.clearance.to_bits()),
+            ("--voxels", self.voxels != usual.voxels),
+            ("--smooth", self.smooth.smooth != usual.smooth),
+        ];
+        let (unused, why, hint) = if self.kind() == KindArg::Box {
+            (
+                of_others.as_slice(),
+                "a box cage does not have this option",
+                "--divisions and --margin shape a box; leave out --kind box and --divisions for a cage that follows the model",
+            )
+        } else {
+            (
+                of_box.as_slice(),
+                "only a box cage has this option",
+                "give --kind box; other cages have --vertices and --clearance",
+            )
+        };
+        match unused.iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(CliError::Mismatch { message: format!("{option}: {why}"), hint }),
+            None => Ok(()),
+        }
     }
 
     /// Options for generating the cage.
@@ -102,8 +142,7 @@ pub(crate) struct CheckArgs {
     /// Model that should be inside the cage.
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side.
-    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
+    #[arg(short, long, help = format!("Report parts of the cage thinner than a cell of a grid with this many cells along its longest side: {}", GRID.allowed), default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
     /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and makes
     /// vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces
@@ -134,16 +173,20 @@ pub(crate) enum CageSource {
 }
 
 impl FromStr for CageSource {
-    type Err = RangeError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, RangeError> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let (kind, number) = text.split_once(':').map_or((text, None), |(kind, n)| (kind, Some(n)));
+        let parse = |what: &str, option: Number, default| {
+            let parsed = number.map_or(Ok(default), |n| option.parse(n));
+            parsed.map_err(|wrong| format!("{what} must be {}", wrong.allowed))
+        };
         let generated = |shape, default| {
-            let target = number.map_or(Ok(default), |n| TARGET.parse(n))?;
+            let target = parse("VERTICES", TARGET, default)?;
             Ok(Self::Auto(CageOptions { target, shape, ..CageOptions::default() }))
         };
         match kind {
-            "box" => Ok(Self::Box { divisions: number.map_or(Ok(BOX_DIVISIONS), |n| DIVISIONS.parse(n))? }),
+            "box" => Ok(Self::Box { divisions: parse("DIVISIONS", DIVISIONS, BOX_DIVISIONS)? }),
             "auto" => generated(Shape::Follow, CageOptions::default().target),
             "hull" => generated(Shape::Hull, HULL_TARGET),
             _ => Ok(Self::File(PathBuf::from(text))),

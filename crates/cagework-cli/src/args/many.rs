@@ -9,6 +9,9 @@ use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs, number};
 
 /// Arguments of `cagework refit`.
 #[derive(Args, Debug)]
+// The GPU is refused with a hint, so the option is parsed, but not listed.
+#[command(mut_arg("backend", |arg| arg.hide(true)))]
+#[command(mut_arg("shape_only", |arg| arg.help("Write the mesh only, without skin and clips")))]
 #[command(
     after_help = "Each model is written under its own name (.gltf as .glb) as soon as it is done. If a model fails, the \
     error is printed and the other models are still written; the exit code is then 1.\n\n\

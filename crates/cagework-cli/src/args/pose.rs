@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use cagework_core::options::{self, BindOptions};
 use clap::Args;
 
-use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, model_help, number, obj_output};
+use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, mesh_help, model_help, number, obj_output};
 
 /// Files of the bound model, and files for the pose that the command finds.
 #[derive(Args, Debug)]
@@ -24,8 +24,7 @@ pub(crate) struct PoseArgs {
     /// File for the pose of the cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
-    /// Cells along the longest side of the cage; the solver samples the gradients of the weights on this grid.
-    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = format!("{}. The solver samples the gradients of the weights on this grid", options::GRID.about()), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
@@ -43,6 +42,9 @@ pub(crate) struct PoseArgs {
     An optional \"weight\" says how much it counts, 1 by default.\n\n\
     Examples:\n  cagework fit shirt.glb --cage cage.obj --weights shirt.npz --target shirt-large.glb -o large.obj\n  \
     cagework fit shirt.glb --cage cage.obj --weights shirt.npz --landmarks body.json -o body.obj")]
+// Unlike `pull`, a fit takes no splats and points.
+#[command(mut_arg("mesh", |arg| arg.help(mesh_help("Mesh that was bound"))))]
+#[command(mut_arg("weights", |arg| arg.help("Weights that `cagework bind --weights` wrote")))]
 #[command(group = clap::ArgGroup::new("to").required(true).args(["target", "landmarks"]))]
 pub(crate) struct FitArgs {
     #[command(flatten)]
@@ -54,7 +56,7 @@ pub(crate) struct FitArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) landmarks: Option<PathBuf>,
     /// Weight of the bending energy relative to the squared distance from the target [default: estimated from the noise of
-    /// the target; 1e-5 with landmarks].
+    /// the targets; 1e-5 with fewer than four targets per cage vertex].
     #[arg(long, value_name = "NUMBER")]
     pub(crate) lambda: Option<f64>,
 }

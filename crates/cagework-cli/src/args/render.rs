@@ -54,7 +54,7 @@ pub(crate) struct RenderArgs {
     /// What to draw.
     #[arg(long, value_enum, default_value_t = ShowArg::Solid)]
     pub(crate) show: ShowArg,
-    /// Cage vertex whose weights are drawn, counted from 0.
+    /// Control whose weights are drawn, counted from 0: the vertices of the cage, then the controls inside.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) column: u32,
     /// Axis perpendicular to the slice.
@@ -147,15 +147,16 @@ pub(crate) enum ShowArg {
     Clay,
     /// The model with its edges.
     Edges,
-    /// The rest pose reconstructed from the weights, with the base mesh as a wireframe: the paper's figures 2 to 5.
+    /// The rest pose reconstructed from the weights, with the base mesh as a wireframe: figures 2 to 5 of K.
+    /// Smith's paper.
     Wireframe,
-    /// Weights of one cage vertex as colours.
+    /// Weights of one control (--column) as colours.
     Weights,
     /// Distance between the reconstructed and the true rest position, as colours on a logarithmic scale.
     Error,
     /// A slice of the grid: interior, boundary and exterior cells.
     Cells,
-    /// A slice of the grid: weights of one cage vertex.
+    /// A slice of the grid: weights of one control (--column).
     Slice,
 }
 

@@ -6,6 +6,7 @@ use cagework_core::options::{
 use clap::Args;
 
 use super::{number, words};
+use crate::error::CliError;
 
 /// Argument for the memory limit.
 #[derive(Args, Clone, Copy, Debug)]
@@ -52,7 +53,8 @@ pub(crate) struct SolveArgs {
     /// Cells of the classic method: fractions of the cage's box along each axis (as published), or cubic.
     #[arg(long, default_value_t, value_parser = words::<CellShape>())]
     cells: CellShape,
-    /// Norm of a cell's change in Eq. 2: Euclidean, or the formula as printed.
+    /// Norm of a cell's change in equation 2 of K. Smith's paper, by which Jacobi sweeps stop: Euclidean, or the formula as
+    /// printed.
     #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
     delta: DeltaNorm,
     /// Vertices outside the cage: `extend` lets them follow the cage fully up to a distance of 5 % of its diagonal, fading to zero at
@@ -68,6 +70,34 @@ impl SolveArgs {
     /// Whether `--backend` selects the GPU.
     pub(crate) fn on_gpu(&self) -> bool {
         self.backend == Backend::Gpu
+    }
+
+    /// Rejects options that the method or solver does not use.
+    ///
+    /// # Errors
+    /// If one of these options is given and is not the default.
+    pub(crate) fn check(&self) -> Result<(), CliError> {
+        let solver = self.solver.unwrap_or(self.method.usual_solver());
+        let refused = |message: &str, hint| Err(CliError::Mismatch { message: message.into(), hint });
+        if self.preconditioner != Preconditioner::default() && solver != Solver::ConjugateGradient {
+            return refused(
+                "--preconditioner: only conjugate gradients have a preconditioner",
+                "add --solver cg, or leave out --preconditioner",
+            );
+        }
+        if self.cells != CellShape::default() && self.method != Method::Classic {
+            return refused(
+                "--cells: the embedded method always uses cubic cells",
+                "leave out --cells, or add --method classic",
+            );
+        }
+        if self.delta != DeltaNorm::default() && solver != Solver::Jacobi {
+            return refused(
+                "--delta: only Jacobi sweeps stop by equation 2",
+                "add --solver jacobi, or leave out --delta",
+            );
+        }
+        Ok(())
     }
 
     /// Returns bind options with `grid` cells along the cage's longest side and this memory limit.

@@ -10,7 +10,7 @@ use super::{ReadArgs, glb_output, mesh_help};
 #[derive(Args, Debug)]
 #[command(
     after_help = "Both files must show the same pose in the same units and axes, as when the clothes were modelled on \
-    the body.\n\nExample:\n  cagework transfer body.glb shirt.obj -o shirt.glb\n  \
+    the body.\n\nExamples:\n  cagework transfer body.glb shirt.obj -o shirt.glb\n  \
     cagework transfer body.glb shirt.obj --push-out 0.002 -o shirt.glb"
 )]
 pub(crate) struct TransferArgs {

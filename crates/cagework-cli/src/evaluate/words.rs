@@ -184,7 +184,7 @@ fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
 /// Composes the contents of `report.md`.
 pub(super) fn report(evaluation: &Evaluation) -> String {
     let mut out = format!(
-        "# The paper's evaluation, repeated\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
+        "# The evaluation of K. Smith's paper, repeated\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
          {} (voxelize, solve, sample).\nMade by `cagework evaluate`, version {}.\n\n\
          ## Findings\n\n{}\n",
         evaluation.mesh,

@@ -29,6 +29,35 @@ fn glb(json: &str, claimed: u32) -> Vec<u8> {
 }
 
 #[test]
+fn options_without_effect_are_refused() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    for (args, words) in [
+        ("cage mesh.obj --margin 0.1 -o c.obj", ["--margin: only a box cage", "hint: give --kind box"]),
+        ("cage mesh.obj --kind hull --divisions 3 -o c.obj", ["--divisions: only a box cage", "hint: "]),
+        ("cage mesh.obj --kind box --vertices 40 -o c.obj", ["--vertices: a box cage", "hint: "]),
+        ("cage mesh.obj --divisions 3 --clearance 0.1 -o c.obj", ["--clearance: a box cage", "hint: "]),
+        (
+            "bind mesh.obj --cage cage.obj --preconditioner v-cycle",
+            ["--preconditioner: only conjugate gradients", "hint: add --solver cg"],
+        ),
+        (
+            "bind mesh.obj --cage cage.obj --cells cubic",
+            ["--cells: the embedded method", "hint: leave out --cells"],
+        ),
+        (
+            "bind mesh.obj --cage cage.obj --method classic --solver cg --delta literal",
+            ["--delta: only Jacobi sweeps", "hint: add --solver jacobi"],
+        ),
+    ] {
+        assert_refused(&sandbox, args, &words);
+    }
+    sandbox.run("bind mesh.obj --cage cage.obj -g 8 --solver cg --preconditioner v-cycle").success();
+    sandbox
+        .run("bind mesh.obj --cage cage.obj -g 8 --method classic --cells cubic --delta literal")
+        .success();
+}
+
+#[test]
 fn files_that_are_not_models_are_rejected() {
     let sandbox = Sandbox::with_sphere_in_box();
     let huge = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":12}],"bufferViews":[{"buffer":0,"byteLength":12}],

@@ -24,6 +24,7 @@ fn help_lists_the_formats_that_a_command_takes() {
         ("refit", false),
         ("transfer", false),
         ("check", false),
+        ("fit", false),
         ("bench", false),
         ("deform", true),
         ("pull", true),
@@ -39,6 +40,35 @@ fn help_lists_the_formats_that_a_command_takes() {
             help.stdout(splats.not())
         };
     }
+}
+
+/// The message names the option of the command, not that of the library.
+#[test]
+fn number_out_of_range_is_refused_with_the_range() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    for (args, message) in [
+        (
+            "cage mesh.obj --vertices 500 -o c.obj",
+            "invalid value '500' for '--vertices <N>': it must be a whole number from 8 to 400",
+        ),
+        (
+            "bind mesh.obj --cage cage.obj --sparsify 0.1",
+            "invalid value '0.1' for '--sparsify <WEIGHT>': it must be 0 (keep all weights) or a threshold below 0.1",
+        ),
+        (
+            "bind mesh.obj --cage auto:500",
+            "invalid value 'auto:500' for '--cage <CAGE>': VERTICES must be a whole number from 8 to 400",
+        ),
+    ] {
+        sandbox.run(args).code(2).stderr(contains(message));
+    }
+}
+
+/// Options that `refit` refuses are not in its help.
+#[test]
+fn help_of_refit_does_not_offer_the_gpu() {
+    let help = Sandbox::new().run("refit --help").success();
+    help.stdout(contains("--backend").not().and(contains("several poses").not()).and(contains("--static")));
 }
 
 #[test]
