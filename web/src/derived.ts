@@ -79,11 +79,11 @@ export function hasUnmadeCage(state: AppState): boolean {
   return state.cage !== null && state.cageMade !== cageKey(state);
 }
 
-/** Fraction of the requested vertices below which the panel explains why a generated cage has so few. */
+/** Fraction of the requested number of vertices below which the panel explains why a generated cage has so few. */
 const MIN_VERTEX_SHARE = 0.9;
 
 /**
- * Whether a generated cage has far fewer vertices than the maximum, because fewer already follow the shape closely
+ * Whether a generated cage has far fewer vertices than requested, because fewer already follow the shape closely
  * enough.
  */
 export function isCageSparse(state: AppState): boolean {

@@ -109,8 +109,8 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 /// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as
 /// in the file. They are float32, or float64 if float32 would lose digits, as for map coordinates.
 ///
-/// states: append the vertices in each morph target; clip: with states, also append the vertices in the frames of this
-/// clip. A cage around all of them is generate_cage(*read_model(model, states=True)).
+/// states: append the vertices in each morph target; clip: with states, also append the vertices at up to 32 equally
+/// spaced times of this clip. A cage around all of them is generate_cage(*read_model(model, states=True)).
 ///
 /// Raises OSError, ModelError.
 ///

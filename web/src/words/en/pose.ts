@@ -103,7 +103,7 @@ export const gesture = {
 
 /** Labels of undo steps. */
 export const did = {
-  forgotten: "The oldest steps can no longer be undone: the history is limited to 256 MB.",
+  forgotten: "The oldest steps can no longer be undone: the history is limited to 256 MiB.",
   carry: "Carry poses over",
   pull: "Pull",
   pin: "Pin",
