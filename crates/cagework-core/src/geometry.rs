@@ -12,7 +12,7 @@ const MIN_RELATIVE_HEIGHT: f64 = 1e-12;
 
 /// Closest point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClosestPoint {
+pub struct TrianglePoint {
     /// The point, object units.
     pub point: DVec3,
     /// Barycentric coordinates, non-negative, sum 1.
@@ -24,7 +24,7 @@ pub struct ClosestPoint {
 /// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster method of section 5.1.5
 /// may choose the wrong edge of a degenerate triangle.
 #[must_use]
-pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestPoint {
+pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> TrianglePoint {
     let [a, b, c] = triangle;
     let barycentric = projection_inside(point, triangle).unwrap_or_else(|| {
         let [on_ab, on_bc, on_ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| share_of_segment(point, p, q));
@@ -40,7 +40,7 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
         best
     });
     let [u, v, w] = barycentric;
-    ClosestPoint { point: u * a + v * b + w * c, barycentric }
+    TrianglePoint { point: u * a + v * b + w * c, barycentric }
 }
 
 /// Computes the distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if

@@ -7,12 +7,13 @@ pub mod assemble;
 pub mod bind;
 pub mod cage;
 pub mod closest;
+pub mod color;
 pub mod contact;
 pub mod controls;
 pub mod coordinates;
 pub mod crossing;
 pub mod deform;
-
+pub mod disjoint;
 pub mod enclosure;
 pub mod field;
 pub mod fill;

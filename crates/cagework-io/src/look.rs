@@ -125,13 +125,3 @@ pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
         _ => None,
     }
 }
-
-/// Converts a colour channel from linear to sRGB (IEC 61966-2-1).
-pub(crate) fn srgb_from_linear(c: f32) -> f32 {
-    if c <= 0.003_130_8 { 12.92 * c.max(0.0) } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// Converts a colour channel from sRGB to linear (IEC 61966-2-1). Colours of OBJ files are sRGB.
-pub(crate) fn linear_from_srgb(c: f32) -> f32 {
-    if c <= 0.040_45 { c.max(0.0) / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-}

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
+use cagework_core::disjoint::DisjointSets;
 use cagework_core::mesh::weld;
 use cagework_core::rotation::nearest_rotation;
 
@@ -189,19 +190,16 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
     let mut is_selected = vec![false; positions.len()];
     selected.iter().for_each(|&v| is_selected[v as usize] = true);
     let unique_of = weld(positions).unique_of;
-    // Union-find forest over welded positions. The root of a piece is its smallest index.
-    let mut above: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut sets = DisjointSets::new(positions.len());
     for triangle in triangles.iter().filter(|t| t.iter().all(|&v| is_selected[v as usize])) {
         let [a, b, c] = triangle.map(|v| unique_of[v as usize]);
-        for other in [b, c] {
-            let (a, other) = (top(&mut above, a), top(&mut above, other));
-            above[a.max(other) as usize] = a.min(other);
-        }
+        sets.join(a, b);
+        sets.join(a, c);
     }
     let mut number_of = HashMap::new();
     let mut pieces: Vec<Vec<u32>> = Vec::new();
     for v in (0..positions.len() as u32).filter(|&v| is_selected[v as usize]) {
-        let place = top(&mut above, unique_of[v as usize]);
+        let place = sets.root(unique_of[v as usize]);
         let number = *number_of.entry(place).or_insert_with(|| {
             pieces.push(Vec::new());
             pieces.len() - 1
@@ -209,15 +207,6 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
         pieces[number].push(v);
     }
     pieces
-}
-
-/// Finds the root of the piece that contains `place`, by union-find with path halving.
-fn top(above: &mut [u32], mut place: u32) -> u32 {
-    while above[place as usize] != place {
-        above[place as usize] = above[above[place as usize] as usize];
-        place = above[place as usize];
-    }
-    place
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::shape;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use cagework_core::cage::{Side, sides_of};
 use cagework_core::crossing::{WELD_DISTANCE, same_places};
+use cagework_core::disjoint::DisjointSets;
 use cagework_core::fill;
 use cagework_core::mesh::PolygonMesh;
 
@@ -212,29 +213,18 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     corners.sort_unstable();
     let mut pinched = Vec::new();
     for around in corners.chunk_by(|a, b| a[0] == b[0]) {
-        // Union-find: two corners are in the same fan if they share a neighbour.
+        // Two corners are in the same fan if they share a neighbour.
         let mut neighbours: Vec<[u32; 2]> =
             (0u32..).zip(around).flat_map(|(k, c)| [[c[1], k], [c[2], k]]).collect();
         neighbours.sort_unstable();
-        let mut root: Vec<u32> = (0..around.len() as u32).collect();
+        let mut sets = DisjointSets::new(around.len());
         let mut fans = around.len();
         for pair in neighbours.windows(2).filter(|pair| pair[0][0] == pair[1][0]) {
-            let [a, b] = [pair[0][1], pair[1][1]].map(|k| find(&mut root, k));
-            root[a as usize] = b;
-            fans -= usize::from(a != b);
+            fans -= usize::from(sets.join(pair[0][1], pair[1][1]));
         }
         if fans > 1 {
             pinched.push(around[0][0]);
         }
     }
     pinched
-}
-
-/// Finds the root of the set that contains `k` in a union-find structure, with path halving.
-fn find(root: &mut [u32], mut k: u32) -> u32 {
-    while root[k as usize] != k {
-        root[k as usize] = root[root[k as usize] as usize];
-        k = root[k as usize];
-    }
-    k
 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use cagework_core::cage::face_triangles;
 use cagework_core::controls::Controls;
+use cagework_core::geometry::distance_along;
 use cagework_core::mesh::PolygonMesh;
 use cagework_core::options::MAX_GRID;
 
@@ -95,8 +96,10 @@ pub(super) fn report_thickness(
         let normal = facing(triangles[t]);
         let middle = (a + b + c) / 3.0;
         let (mut way, mut nearest) = (f64::INFINITY, t);
-        for (other, corners) in triangles.iter().enumerate().filter(|(other, _)| *other != t) {
-            if let Some(distance) = distance_along(middle, -normal, corners).filter(|d| *d < way) {
+        for (other, &corners) in triangles.iter().enumerate().filter(|(other, _)| *other != t) {
+            // Flush walls of overlapping parts are at distance 0. They bound no thin part.
+            let hit = distance_along(middle, -normal, corners).filter(|distance| *distance > 0.0);
+            if let Some(distance) = hit.filter(|distance| *distance < way) {
                 (way, nearest) = (distance, other);
             }
         }
@@ -123,21 +126,4 @@ pub(super) fn report_thickness(
         });
     }
     thinnest.is_finite().then_some(thinnest as f32)
-}
-
-/// Computes the distance from a point along a unit direction to a triangle; `None` if the ray misses (Moeller and
-/// Trumbore 1997).
-fn distance_along(from: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
-    let (ab, ac) = (*b - *a, *c - *a);
-    let p = direction.cross(ac);
-    let determinant = ab.dot(p);
-    if determinant.abs() < 1e-12 * ab.length() * ac.length() {
-        return None;
-    }
-    let s = (from - *a) / determinant;
-    let u = s.dot(p);
-    let q = s.cross(ab);
-    let v = direction.dot(q);
-    let distance = ac.dot(q);
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
 }

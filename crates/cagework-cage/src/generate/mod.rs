@@ -34,6 +34,7 @@ mod voxels;
 use glam::{DVec3, Vec3};
 
 use cagework_core::cage::Cage;
+use cagework_core::disjoint::DisjointSets;
 use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use gaps::NarrowGaps;
@@ -319,23 +320,10 @@ fn relax_and_verify(
 }
 
 fn n_parts(cage: &Cage) -> u32 {
-    let mut root: Vec<u32> = (0..cage.n_vertices() as u32).collect();
-    let find = |root: &mut Vec<u32>, mut v: u32| {
-        while root[v as usize] != v {
-            root[v as usize] = root[root[v as usize] as usize];
-            v = root[v as usize];
-        }
-        v
-    };
+    let mut sets = DisjointSets::new(cage.n_vertices());
     let mut parts = cage.n_vertices() as u32;
-    for t in cage.triangles() {
-        for k in 1..3 {
-            let (a, b) = (find(&mut root, t[0]), find(&mut root, t[k]));
-            if a != b {
-                root[a as usize] = b;
-                parts -= 1;
-            }
-        }
+    for &[a, b, c] in cage.triangles() {
+        parts -= u32::from(sets.join(a, b)) + u32::from(sets.join(a, c));
     }
     parts
 }

@@ -41,14 +41,13 @@ pub fn cividis(value: f32) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
+    use cagework_core::color::linear_from_byte;
+
     use super::*;
 
     /// Relative luminance of an sRGB colour (IEC 61966-2-1).
     fn luminance(color: [u8; 3]) -> f32 {
-        let linear = color.map(|c| {
-            let c = f32::from(c) / 255.0;
-            if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-        });
+        let linear = color.map(linear_from_byte);
         0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
     }
 

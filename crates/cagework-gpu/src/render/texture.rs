@@ -1,5 +1,7 @@
 //! Texture upload, with mipmaps averaged in linear light.
 
+use cagework_core::color::{byte_from_linear, linear_from_byte};
+
 use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
@@ -16,19 +18,8 @@ struct Tables {
 
 impl Tables {
     fn new() -> Self {
-        let linear = (0..256u32)
-            .map(|c| {
-                let c = c as f32 / 255.0;
-                if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-            })
-            .collect();
-        let encoded = (0..=ENCODE_STEPS)
-            .map(|k| {
-                let x = k as f32 / ENCODE_STEPS as f32;
-                let c = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-                (255.0 * c).round() as u8
-            })
-            .collect();
+        let linear = (0..=255).map(linear_from_byte).collect();
+        let encoded = (0..=ENCODE_STEPS).map(|k| byte_from_linear(k as f32 / ENCODE_STEPS as f32)).collect();
         Self { linear, encoded }
     }
 

@@ -1,5 +1,7 @@
 //! Colours of themes, in sRGB.
 
+use cagework_core::color::{byte_from_linear, linear_from_byte};
+
 use super::layout::{RING_STATE, Style};
 use super::scene::Theme;
 
@@ -109,27 +111,15 @@ impl Theme {
 
 /// Linear colour from sRGB (IEC 61966-2-1); alpha is unchanged.
 pub(super) fn linear((rgb, alpha): Color) -> [f32; 4] {
-    let channel = |shift: u32| linear_from_srgb((rgb >> shift & 0xff) as u8);
+    let channel = |shift: u32| linear_from_byte((rgb >> shift & 0xff) as u8);
     [channel(16), channel(8), channel(0), alpha]
-}
-
-/// Linear value in [0, 1] from an sRGB byte (IEC 61966-2-1).
-fn linear_from_srgb(byte: u8) -> f32 {
-    let c = f32::from(byte) / 255.0;
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-}
-
-/// sRGB byte from a linear value in [0, 1].
-fn srgb_from_linear(c: f32) -> u8 {
-    let srgb = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * srgb).round() as u8
 }
 
 /// Converts a pixel of sRGB bytes from premultiplied to straight alpha, which image files use.
 pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
     if (1..=254).contains(alpha) {
         for value in rgb {
-            *value = srgb_from_linear(linear_from_srgb(*value) * 255.0 / f32::from(*alpha));
+            *value = byte_from_linear(linear_from_byte(*value) * 255.0 / f32::from(*alpha));
         }
     }
 }
@@ -271,7 +261,7 @@ mod tests {
     fn division_by_alpha_inverts_premultiplication() {
         for alpha in [40_u8, 128, 254, 255] {
             let shown = 200_u8;
-            let product = srgb_from_linear(linear_from_srgb(shown) * f32::from(alpha) / 255.0);
+            let product = byte_from_linear(linear_from_byte(shown) * f32::from(alpha) / 255.0);
             let mut pixel = [product, 0, product, alpha];
             divide_by_alpha(&mut pixel);
             // `product` was rounded to a byte, so the quotient differs from `shown` by up to 2.

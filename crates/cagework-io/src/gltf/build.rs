@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use cagework_core::TriMesh;
+use cagework_core::color::{linear_from_byte, linear_from_srgb};
 use cagework_core::deform::vertex_normals;
 use cagework_core::skin::Rig;
 use glam::{DVec3, Mat4, Quat, Vec3};
@@ -12,7 +13,6 @@ use serde_json::{Value, json};
 use super::accessor::MAX_ELEMENTS;
 use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
-use crate::look::linear_from_srgb;
 use crate::obj::{NONE, ObjDocument};
 use crate::origin::translation;
 use crate::siblings::Image;
@@ -159,7 +159,9 @@ pub fn write_mesh_glb(
         // OBJ colours are sRGB, glTF vertex colours linear.
         let linear: Vec<f32> = colours
             .iter()
-            .flat_map(|&[r, g, b, a]| [to_linear(r), to_linear(g), to_linear(b), f32::from(a) / 255.0])
+            .flat_map(|&[r, g, b, a]| {
+                [linear_from_byte(r), linear_from_byte(g), linear_from_byte(b), f32::from(a) / 255.0]
+            })
             .collect();
         attributes["COLOR_0"] = pack.push_floats(&mut json, &linear, 4, true, false).into();
     }
@@ -220,12 +222,6 @@ fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Va
     let root: Vec<f32> = rig.root.iter().flat_map(Vec3::to_array).collect();
     add(pack.push_floats(json, &root, 3, false, false), first, "translation");
     push(json, "animations", json!({ "name": rig.clip, "samplers": samplers, "channels": channels }));
-}
-
-/// Converts 8-bit sRGB to linear (IEC 61966-2-1).
-fn to_linear(value: u8) -> f32 {
-    let value = f32::from(value) / 255.0;
-    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 /// A rough, non-metallic material. glTF's default is metallic, unlike OBJ materials.

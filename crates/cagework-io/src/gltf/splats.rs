@@ -1,6 +1,7 @@
 //! Gaussian splats in glTF: point primitives with the extension KHR_gaussian_splatting. Scales and opacities are
 //! linear, rotations x, y, z, w.
 
+use cagework_core::color::linear_from_srgb;
 use cagework_core::splats::{decompose, n_harmonics, rotate_harmonics, turn_of};
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 use serde_json::{Value, json};
@@ -10,7 +11,6 @@ use super::container::glb_of;
 use super::size::MAX_PRIMITIVES;
 use super::{GltfDocument, GltfError, SPLATS_EXTENSION};
 use crate::error::WriteError;
-use crate::look::linear_from_srgb;
 use crate::splats::{RawSplats, SplatError, SplatsToWrite, band_0, color_of, unit_byte};
 
 /// Colour space of 3DGS captures.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
+use cagework_core::color::srgb_from_linear;
 use cagework_core::field::{Field, bend_vertices};
 use cagework_core::splats::Splats;
 use cagework_core::words::counted;
@@ -15,7 +16,6 @@ use super::format::ModelProperty;
 use super::{Document, Model, ModelFormat};
 use crate::error::WriteError;
 use crate::gltf::{self, Pose, PoseClip, Rest};
-use crate::look::srgb_from_linear;
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
 use crate::splats::{self, Capture, MAX_COLOR, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
@@ -26,7 +26,8 @@ use crate::up::UpAxis;
 impl Model {
     /// Exports the model with new positions as `format`.
     ///
-    /// # Errors The errors of the writer for `format`, such as [`Self::write_glb`].
+    /// # Errors
+    /// The errors of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         match &self.capture {
             Some(capture) if format.holds_splats() => {

@@ -4,11 +4,12 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::lex::{lines, tokens};
+use cagework_core::color::linear_from_srgb;
 use cagework_core::words::counted;
 use glam::Vec3;
 
 use super::{NONE, ObjDocument};
-use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb};
+use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex};
 use crate::normals::Shading;
 use crate::siblings::{Image, Resolve, SiblingError, Siblings};
 

@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use glam::Vec3;
 
 use super::nearest::KdTree;
+use cagework_core::disjoint::DisjointSets;
 use cagework_core::mesh::weld;
 
 /// Lower limit on the lengths of the graph's edges, including bridges, as a fraction of the model's size.
@@ -84,12 +85,11 @@ impl Geodesic {
 
 /// Finds one edge from each smaller component to the nearest node of the largest one.
 fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
-    let mut part: Vec<u32> = (0..points.len() as u32).collect();
+    let mut sets = DisjointSets::new(points.len());
     for &[a, b] in edges {
-        let [a, b] = [root(&mut part, a), root(&mut part, b)];
-        part[a.max(b) as usize] = a.min(b);
+        sets.join(a, b);
     }
-    let roots: Vec<u32> = (0..points.len() as u32).map(|i| root(&mut part, i)).collect();
+    let roots: Vec<u32> = (0..points.len() as u32).map(|i| sets.root(i)).collect();
     let mut sizes = vec![0_u32; points.len()];
     for &r in &roots {
         sizes[r as usize] += 1;
@@ -110,15 +110,6 @@ fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
         }
     }
     best.into_iter().flatten().map(|(edge, _)| edge).collect()
-}
-
-/// Finds the root of the component that contains node `i`, by union-find with path halving.
-fn root(part: &mut [u32], mut i: u32) -> u32 {
-    while part[i as usize] != i {
-        part[i as usize] = part[part[i as usize] as usize];
-        i = part[i as usize];
-    }
-    i
 }
 
 #[cfg(test)]
