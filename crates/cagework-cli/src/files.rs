@@ -21,8 +21,8 @@ use outputs::FileIdentity;
 pub(crate) use outputs::{check_outputs, refuse_files_named, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
-/// Largest size of a file that is read, bytes. The arrays of a larger model would exceed 32-bit indices.
-pub(crate) const MAX_FILE_BYTES: u64 = 2 << 30;
+/// Largest size of a file that is read, bytes.
+const MAX_FILE_BYTES: u64 = cagework_io::MAX_MODEL_BYTES;
 
 /// All files read so far, including buffers, materials and textures that models name. Outputs must not overwrite them.
 static INPUT_FILES: Mutex<Vec<FileIdentity>> = Mutex::new(Vec::new());

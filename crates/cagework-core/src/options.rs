@@ -298,7 +298,8 @@ impl Number {
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindOptions {
-    /// Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
+    /// Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
+    /// Default 64.
     pub grid: u32,
     /// Discretisation of the cage. Default embedded.
     pub method: Method,
@@ -385,9 +386,10 @@ impl BindOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::stop::MAX_CYCLES;
 
     fn assert_words<
-        T: Choice + PartialEq + std::fmt::Debug + std::fmt::Display + FromStr<Err = UnknownWord> + Serialize,
+        T: Choice + PartialEq + std::fmt::Debug + Display + FromStr<Err = UnknownWord> + Serialize,
     >() {
         for &(word, value) in T::ALL {
             assert_eq!([word.parse(), value.to_string().parse()], [Ok(value), Ok(value)]);
@@ -423,6 +425,17 @@ mod tests {
             "sparsify is 0.1; it must be 0 (keep all weights) or a threshold below 0.1"
         );
         assert_eq!(SPARSIFY.parse::<f32>("0.10").unwrap_err().value, "0.10");
+    }
+
+    /// Texts of ranges contain literals, because they are constants.
+    #[test]
+    fn texts_of_ranges_agree_with_the_limits() {
+        assert_eq!(GRID.allowed, format!("a whole number from {MIN_GRID} to {MAX_GRID}"));
+        assert!(MAX_ITERATIONS.help.ends_with(&format!("at most {MAX_CYCLES} V-cycles")));
+        assert_eq!(SMOOTH_STEPS.allowed, "a whole number from 0 to 3");
+        assert!(SMOOTH_STEPS.check(3).is_ok() && SMOOTH_STEPS.check(4).is_err());
+        assert_eq!(SPARSIFY.allowed, "0 (keep all weights) or a threshold below 0.1");
+        assert!(SPARSIFY.check(0.0999).is_ok() && SPARSIFY.check(0.1).is_err());
     }
 
     #[test]

@@ -18,13 +18,9 @@ use glam::Vec3;
 
 use crate::grid::NO_CELL;
 use crate::options::DeltaNorm;
-use crate::solve::rows::ProlongationMode;
+use crate::solve::rows::{MIN_CHANGE, ProlongationMode};
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
-
-/// Changes of a weight below this count as zero. The limit has a margin over 1e-19, below which the square of a change
-/// is denormal in f32.
-const MIN_CHANGE: f32 = 1e-18;
 
 /// Right-hand side of a row plus the values of its neighbours, summed in the kernels' order.
 fn gather(level: &LevelTable, n_lanes: usize, row: usize, lane: usize, rhs: &[f32], field: &[f32]) -> f32 {

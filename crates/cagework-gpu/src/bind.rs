@@ -18,10 +18,6 @@ use crate::plan::Plan;
 use crate::sample::Sampler;
 use crate::stream::Stream;
 
-/// Approximate number of decades by which delta falls from the first sweep until it reaches [`BindOptions::tau`], for
-/// the progress bar.
-const JACOBI_DECADES: f32 = 4.0;
-
 /// Typical number of V-cycles per batch, for the progress bar.
 const USUAL_CYCLES: f32 = 5.0;
 
@@ -168,9 +164,7 @@ async fn jacobi(
     let allocated = allocator.settle().await?;
     let (sweeps, report) = jacobi
         .solve(stream, rule, options.delta_norm, |stream, sweeps, delta| {
-            let delta = delta as f32;
-            let to_go = (delta / options.tau).max(1.0).log10() / JACOBI_DECADES;
-            stream.set_status(1.0 - to_go, sweeps, Some(delta));
+            stream.set_status(rule.jacobi_progress(delta), sweeps, Some(delta as f32));
         })
         .await?;
     let solve_ms = stream.now_ms() - began;

@@ -12,12 +12,9 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::hold::Holder;
 use crate::kernels;
-use crate::layout::Work;
+use crate::layout::{WORK_STRIDE, Work};
 use crate::pipelines::Launch;
 use crate::skin::Skinner;
-
-/// Stride of dispatch parameters, bytes: WebGPU's baseline alignment of dynamic offsets.
-const WORK_STRIDE: u64 = 256;
 
 /// Maximum number of weights per upload, before the rows are rounded up to whole slices of [`SlicedWeights`]. Such an
 /// upload blocks a page's main thread for 10 ms.

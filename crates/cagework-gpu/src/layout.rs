@@ -2,6 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// Stride of dispatch parameters, bytes: WebGPU's baseline alignment of dynamic offsets.
+pub(crate) const WORK_STRIDE: u64 = 256;
+
 /// Parameters of a dispatch. Mirrors `Work` in `shaders/work.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

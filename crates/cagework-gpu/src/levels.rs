@@ -7,9 +7,7 @@ use cagework_core::stencil::tables::{LevelTable, TransferTable};
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
-
-/// Bytes of a quad: four columns of a row.
-pub(crate) const QUAD_BYTES: u64 = 16;
+use crate::plan::QUAD_BYTES;
 
 /// Stencils of a level on the GPU.
 #[derive(Debug)]

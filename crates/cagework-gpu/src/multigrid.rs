@@ -12,9 +12,9 @@ use crate::buffers::{Allocator, Readback};
 use crate::error::GpuError;
 use crate::kernels;
 use crate::layout::{Work, mode};
-use crate::levels::{GpuLevel, GpuTransfer, QUAD_BYTES, upload_rhs};
+use crate::levels::{GpuLevel, GpuTransfer, upload_rhs};
 use crate::pipelines::Launch;
-use crate::plan::Plan;
+use crate::plan::{Plan, QUAD_BYTES};
 use crate::stream::Stream;
 
 // Indices in the buffer of numbers that are read back.

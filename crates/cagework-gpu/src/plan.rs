@@ -7,7 +7,7 @@ use cagework_core::stencil::REDUCE_VALUES;
 use thiserror::Error;
 
 /// Bytes of a quad: the values of a row in four columns.
-const QUAD_BYTES: u64 = 16;
+pub(crate) const QUAD_BYTES: u64 = 16;
 
 /// Maximum number of columns of a batch. Larger batches are not faster, but enlarge the block that is read back.
 pub const MAX_LANES: u64 = 128;

@@ -8,8 +8,7 @@ use crate::buffers::{Allocator, Readback};
 use crate::error::GpuError;
 use crate::kernels;
 use crate::layout::Work;
-use crate::levels::QUAD_BYTES;
-use crate::plan::Plan;
+use crate::plan::{Plan, QUAD_BYTES};
 use crate::stream::Stream;
 
 /// Sampling stencils on the GPU, with buffers for one block of weights.

@@ -14,7 +14,7 @@ use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::kernels;
-use crate::layout::{Work, mode};
+use crate::layout::{WORK_STRIDE, Work, mode};
 use crate::pipelines::Launch;
 use crate::skin::field_table;
 use crate::table::{Entry, Table};
@@ -227,9 +227,6 @@ struct SplatKernels {
     /// Kernels that count, scan and scatter, first for the lower digit, then for the higher one.
     sort: [[Launch; 3]; 2],
 }
-
-/// Alignment of dynamic offsets, bytes.
-const WORK_STRIDE: u64 = 256;
 
 impl SplatMover {
     /// Uploads the splats at rest.

@@ -15,7 +15,7 @@ use crate::buffers::{Allocator, Readback};
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::kernels::Kernel;
-use crate::layout::Work;
+use crate::layout::{WORK_STRIDE, Work};
 use crate::pipelines::Launch;
 
 /// Target time of a slice, ms: three frames at 60 Hz; watchdogs of drivers allow 2 s.
@@ -33,14 +33,8 @@ const INITIAL_BUDGET: u64 = 1 << 25;
 /// a readback.
 const BUDGET_RANGE: [u64; 2] = [1 << 20, 1 << 36];
 
-/// Stride of dispatch parameters, bytes: WebGPU's baseline alignment of dynamic offsets.
-const WORK_STRIDE: u64 = 256;
-
 /// Maximum number of dispatches in a slice.
 const MAX_WORKS: u64 = 1024;
-
-/// Maximum number of workgroups per axis: WebGPU's baseline limit.
-const MAX_GROUPS: u32 = 65_535;
 
 /// A command that is recorded but not submitted.
 #[derive(Debug)]
@@ -142,10 +136,7 @@ impl<'a> Stream<'a> {
             let room =
                 ((self.budget - self.cost) / cost).max(1).next_multiple_of(u64::from(launch.workgroup));
             let part = u64::from(count - first).min(room) as u32;
-            let groups = part.div_ceil(launch.workgroup);
-            let rows = groups.div_ceil(MAX_GROUPS);
-            let groups = [groups.div_ceil(rows), rows];
-            let stride = groups[0] * launch.workgroup;
+            let (groups, stride) = launch.groups(part);
             self.dispatch(
                 launch,
                 Work { first, count: part, stride, ..work },

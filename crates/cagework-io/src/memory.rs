@@ -18,6 +18,9 @@ pub struct MemoryError {
 
 const MIB: u64 = 1 << 20;
 
+/// Memory of the table for welding coincident vertices, bytes per vertex.
+pub(crate) const WELD_BYTES: u64 = 36;
+
 /// Size up to which every file may be unpacked, bytes.
 const MAX_UNPACKED_BYTES: u64 = 64 * MIB;
 /// Contents above [`MAX_UNPACKED_BYTES`] may have at most this many times the size of the compressed file. Compression

@@ -10,12 +10,9 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::memory::MemoryError;
+use crate::memory::{MemoryError, WELD_BYTES};
 use crate::obj::{Corner, Group, Line, MAX_FACE_CORNERS, Material, NONE, ObjDocument, shown_token};
 use crate::origin::{origin_near, relative};
-
-/// Memory of the table for welding coincident vertices, bytes per vertex.
-const WELD_BYTES: u64 = 36;
 
 /// Error of reading a PLY, STL, OFF or 3MF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -12,9 +12,9 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 /// error is the reason as a predicate, such as "is a folder".
 pub type Resolve<'a> = dyn FnMut(&str) -> Option<Result<Vec<u8>, String>> + 'a;
 
-/// Limit on the total size of the files that one model refers to, bytes. It equals the limit on the size of the model's
-/// own file.
-const MAX_BYTES: u64 = 2 << 30;
+/// Limit on the total size of the files that one model refers to, bytes; the command has the same limit for a file. The
+/// arrays of a larger model would exceed 32-bit indices.
+pub const MAX_MODEL_BYTES: u64 = 2 << 30;
 
 /// An encoded image; its format is recognised by its content.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ pub(crate) const IMAGE_FAULT: &str = "is not a PNG, JPEG, WebP or KTX2 image";
 impl<'a> Siblings<'a> {
     /// Creates a cache of files from `resolve`, up to `memory_limit` bytes.
     pub(crate) fn new(resolve: &'a mut Resolve<'_>, memory_limit: u64) -> Self {
-        let limit = memory_limit.min(MAX_BYTES);
+        let limit = memory_limit.min(MAX_MODEL_BYTES);
         Self { resolve, files: BTreeMap::new(), images: HashMap::new(), bytes: 0, limit }
     }
 

@@ -4,7 +4,7 @@ use cagework_core::bind as bind_points;
 use cagework_core::deform::deform_bound;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::{BindOptions, TriMesh};
-use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
+use cagework_pose::pull::{DRAG_FRAMES, Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
 use glam::{DVec3, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -13,9 +13,6 @@ use pyo3::types::PyDict;
 use crate::bind::bind_options;
 use crate::cage::Cage;
 use crate::{arrays, error, work};
-
-/// Number of frames of the simulated drag, as in `cagework pull`.
-const FRAMES: u32 = 30;
 
 /// Solves for the pose of the cage that moves vertices of the model to targets with little bending:
 /// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5,
@@ -95,7 +92,7 @@ pub(crate) fn pull<'py>(
         let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
         let mut drag = drag.map_err(error::pull)?;
         let to = drag.targets(&grabs, &to, &mesh.triangles, &deform_bound(&weights, &frames, &start));
-        drag.go(&to, FRAMES);
+        drag.go(&to, DRAG_FRAMES);
         drag.settle(&to);
         Ok(drag.cage())
     })??;

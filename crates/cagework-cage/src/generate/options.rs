@@ -321,3 +321,27 @@ pub(super) fn check(
     }
     Ok([min, max])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texts of ranges contain literals, because they are constants.
+    #[test]
+    fn texts_of_ranges_agree_with_the_limits() {
+        assert_eq!(TARGET.allowed, format!("a whole number from {MIN_TARGET} to {MAX_TARGET}"));
+        assert_eq!(
+            VOXELS.allowed,
+            format!("0 (automatic) or a whole number from {MIN_VOXELS} to {MAX_VOXELS}")
+        );
+        for (option, text, inside, outside) in [
+            (DETAIL, "a fraction of the longest side from 0.005 to 0.2", [0.005_f32, 0.2], [0.004, 0.21]),
+            (CLEARANCE, "a fraction of the diagonal from 0 to 0.25", [0.0, 0.25], [-0.01, 0.26]),
+            (DIVISIONS, "a whole number from 1 to 16", [1.0, 16.0], [0.0, 17.0]),
+        ] {
+            assert_eq!(option.allowed, text);
+            assert!(inside.iter().all(|&value| option.check(value).is_ok()), "{text}");
+            assert!(outside.iter().all(|&value| option.check(value).is_err()), "{text}");
+        }
+    }
+}

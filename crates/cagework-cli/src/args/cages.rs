@@ -10,6 +10,7 @@ use cagework_cage::generate::{
 };
 use cagework_core::BindOptions;
 use cagework_core::options::{GRID, Number};
+use cagework_io::MAX_CLIP_TIMES;
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
@@ -54,8 +55,7 @@ pub(crate) struct CageArgs {
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
-    /// Enclose the model at up to 32 equally spaced times of the clip with this name as well, in each model that has it.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = format!("Enclose the model at up to {MAX_CLIP_TIMES} equally spaced times of the clip with this name as well, in each model that has it"))]
     pub(crate) around_clip: Option<String>,
     #[arg(long, help = DIVISIONS.about(), value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
     pub(crate) divisions: Option<u32>,

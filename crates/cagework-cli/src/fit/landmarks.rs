@@ -5,6 +5,7 @@ use std::path::Path;
 use cagework_core::Weights;
 use cagework_core::geometry::closest_point_on_triangle;
 use cagework_io::json_fault;
+use cagework_pose::pull::is_barycentric;
 use glam::DVec3;
 use serde::Deserialize;
 
@@ -19,9 +20,6 @@ const MAX_LANDMARKS: usize = 10_000;
 /// Number of landmarks, not all in one plane, that determine an affine map. With fewer, the bending energy of the fit
 /// determines the rotation.
 const N_AFFINE_LANDMARKS: usize = 4;
-
-/// Tolerance of barycentric coordinates: each may be this much below 0, and their sum may differ from 1 by this much.
-const BARY_TOLERANCE: f64 = 1e-3;
 
 /// A landmark as the file contains it, with positions in the file's axes.
 #[derive(Debug, Deserialize)]
@@ -127,9 +125,7 @@ fn surface_point(bound: &BoundModel, landmark: &LandmarkJson) -> Result<SurfaceP
         LandmarkJson { triangle: Some(t), vertex: None, point: None, bary, .. } => {
             below("triangle", t, model.triangles.len())?;
             let bary = bary.unwrap_or([1.0 / 3.0; 3]);
-            if bary.iter().any(|b| *b < -BARY_TOLERANCE)
-                || (bary.iter().sum::<f64>() - 1.0).abs() > BARY_TOLERANCE
-            {
+            if !is_barycentric(bary) {
                 return Err(format!(
                     "has the barycentric coordinates {bary:?}; expected non-negative numbers that sum to 1"
                 ));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cagework_io::{json_fault, shown};
-use cagework_pose::pull::{Handle, Reach};
+use cagework_pose::pull::{DRAG_FRAMES, Handle, Reach};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
@@ -28,7 +28,7 @@ struct JobJson {
     start: Option<PathBuf>,
     #[serde(default = "half")]
     relax: f64,
-    #[serde(default = "thirty")]
+    #[serde(default = "default_frames")]
     frames: u32,
 }
 
@@ -53,8 +53,8 @@ fn half() -> f64 {
     0.5
 }
 
-fn thirty() -> u32 {
-    30
+fn default_frames() -> u32 {
+    DRAG_FRAMES
 }
 
 /// A job with validated values.
@@ -143,5 +143,24 @@ impl Job {
         };
         let start = file.start.map(resolve);
         Ok(Self { grabs, to, pins, reach, start, relax: file.relax, frames: file.frames })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cagework_core::words::grouped;
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::args::Cli;
+
+    #[test]
+    fn help_gives_the_defaults_and_the_limit_of_frames() {
+        let command = Cli::command();
+        let pull = command.find_subcommand("pull").expect("the command has this subcommand");
+        let help = pull.get_after_help().expect("pull describes jobs").to_string();
+        let frames = format!("1 to {}; the default is {DRAG_FRAMES}.", grouped(MAX_FRAMES as usize));
+        assert!(help.contains(&frames), "{help}");
+        assert!(help.contains(&format!("the default is {}.", half())), "{help}");
     }
 }

@@ -16,10 +16,6 @@ use crate::team::Team;
 
 use super::watch::Watch;
 
-/// Rough number of decades by which delta, the change of the values per sweep, falls from the first Jacobi sweep to
-/// the tolerance. For the progress bar only.
-const JACOBI_DECADES: f64 = 4.0;
-
 /// Sampled columns with statistics of the solve.
 #[derive(Clone, Debug, Default)]
 pub struct Solution {
@@ -180,8 +176,7 @@ fn jacobi_fields(
 ) -> Result<(Vec<Vec<Row>>, Solution), Cancellation> {
     let rule = options.stop_rule();
     let (fields, report) = jacobi::solve(hierarchy, team, rule, options.delta_norm, |sweeps, delta| {
-        let to_go = (delta / rule.tolerance).max(1.0).log10() / JACOBI_DECADES;
-        watch.report(Stage::Solve, 1.0 - to_go as f32, sweeps, Some(delta as f32)).is_ok()
+        watch.report(Stage::Solve, rule.jacobi_progress(delta), sweeps, Some(delta as f32)).is_ok()
     })?;
     let level = &hierarchy.levels[0];
     let solved = Solution {

@@ -24,8 +24,8 @@ pub type Row = [f32; LANES];
 pub const ZERO: Row = [0.0; LANES];
 
 /// Changes of a weight below this count as zero. The limit has a margin over 1e-19, below which the square of a change
-/// is denormal in f32.
-const MIN_CHANGE: f32 = 1e-18;
+/// is denormal in f32. `shaders/change_norms.wgsl` has the same constant.
+pub(crate) const MIN_CHANGE: f32 = 1e-18;
 
 /// Splits a field by colour. Returns the rows of `colour`, then the rows of the other colour.
 #[inline(always)]

@@ -17,7 +17,17 @@ pub struct StopRule {
 /// reach the precision of f32 before this limit.
 pub const MAX_CYCLES: u32 = 60;
 
+/// Rough number of decades by which delta falls from the first Jacobi sweep to the tolerance.
+const JACOBI_DECADES: f64 = 4.0;
+
 impl StopRule {
+    /// Rough share of a Jacobi solve that is complete when a sweep has this delta, for a progress bar; below 0 at the
+    /// start of solves that take longer than usual.
+    #[must_use]
+    pub fn jacobi_progress(&self, delta: f64) -> f32 {
+        (1.0 - (delta / self.tolerance).max(1.0).log10() / JACOBI_DECADES) as f32
+    }
+
     /// The rule for V-cycles, limited by [`MAX_CYCLES`].
     #[must_use]
     pub fn of_cycles(self) -> Self {

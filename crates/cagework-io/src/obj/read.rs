@@ -13,7 +13,7 @@ use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, libraries_of, read_materials, rest_of};
 use super::triangulate::Triangulator;
-use crate::memory::MemoryError;
+use crate::memory::{MemoryError, WELD_BYTES};
 use crate::origin::relative;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 use crate::siblings::{Resolve, SiblingError, Siblings};
@@ -176,9 +176,6 @@ struct Reader<'a> {
     memory_limit: u64,
     notices: Vec<String>,
 }
-
-/// Memory of the table for welding coincident vertices, bytes per vertex.
-const WELD_BYTES: u64 = 36;
 
 /// Limit on `usemtl` names. Each name becomes a draw call and a GLB primitive.
 pub(crate) const MAX_MATERIALS: usize = 1 << 14;

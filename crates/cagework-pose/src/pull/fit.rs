@@ -38,9 +38,9 @@ const MIN_STEP_MOVE: f64 = 1e-8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
     /// Weight of the energy E ([`crate::pull`]) against the mean squared distance from the targets (divided by the
-    /// model's size squared), at least 0. `None`: the most likely value given the remaining distance,
-    /// `n d / ((N - n) E)`, for N points at the mean squared distance d and a cage of n vertices, limited to 1e-10 to
-    /// 1e-2; with fewer than four points per cage vertex, 1e-5.
+    /// model's size squared), at least 0. `None`: the most likely value `n d / (N E)` for N points, a cage of n vertices
+    /// and the variance d of the noise, which is estimated as the mean squared distance times `N / (N - n)`; limited to
+    /// 1e-10 to 1e-2. With fewer than four points per cage vertex, 1e-5.
     pub lambda: Option<f64>,
 }
 

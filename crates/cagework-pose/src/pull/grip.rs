@@ -8,6 +8,13 @@ use cagework_core::weights::Weights;
 /// their sum at most this far from 1.
 const BARYCENTRIC_TOLERANCE: f64 = 1e-3;
 
+/// Whether three numbers are barycentric coordinates: not negative, with the sum 1, up to a tolerance of 1e-3.
+#[must_use]
+pub fn is_barycentric(bary: [f64; 3]) -> bool {
+    let sum: f64 = bary.iter().sum();
+    bary.iter().all(|b| *b >= -BARYCENTRIC_TOLERANCE) && (sum - 1.0).abs() <= BARYCENTRIC_TOLERANCE
+}
+
 /// A point that can be grabbed or pinned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Handle {
@@ -60,10 +67,7 @@ impl Grip {
             }
             Handle::Triangle(t, bary) => {
                 check("triangle of the model", t, triangles.len())?;
-                let sum: f64 = bary.iter().sum();
-                if !(bary.iter().all(|b| *b >= -BARYCENTRIC_TOLERANCE)
-                    && (sum - 1.0).abs() < BARYCENTRIC_TOLERANCE)
-                {
+                if !is_barycentric(bary) {
                     return Err(PullError::Barycentric(bary));
                 }
                 let corners = triangles[t as usize];

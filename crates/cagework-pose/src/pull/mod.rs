@@ -37,11 +37,14 @@ use thiserror::Error;
 pub use drag::{Drag, DragOptions, REACH, Reach};
 pub use energy::Pull;
 pub use fit::{Fit, FitOptions};
-pub use grip::{Grip, Handle};
+pub use grip::{Grip, Handle, is_barycentric};
 pub use samples::Probes;
 
 /// Limit on grabs and pins together, because a drag inverts a dense matrix of that size.
 pub const MAX_HANDLES: usize = 200;
+
+/// Usual number of frames in which a drag that is not interactive moves its grabs to their targets.
+pub const DRAG_FRAMES: u32 = 30;
 
 /// Limit on controls (cage vertices and inner controls), because the matrices are dense and every frame multiplies by
 /// them.
