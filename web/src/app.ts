@@ -76,7 +76,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     view,
     works,
     settle,
-    overtaken: (sample) => tour.guide()?.overtaken(sample),
+    beforeOpen: (sample) => tour.guide()?.beforeOpen(sample),
   });
   const tour = createTour(ctx, { bind, edit, view, files, works });
   const fixes: Record<NonNullable<Explanation["fix"]>, () => void> = {

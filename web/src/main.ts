@@ -67,7 +67,7 @@ async function main(): Promise<void> {
   const crashes = watchCrashes(store, restart, (crash) => {
     askAfterCrash(crash, () => {
       forgetCrash();
-      void app.works.distrust().finally(restart);
+      void app.works.excludeOwn().finally(restart);
     });
   });
   const offline = keepOffline((adopt) => {

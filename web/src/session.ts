@@ -253,9 +253,9 @@ async function start(opened: OpenResult & Needs) {
      * Gives a model the joints, joint weights and morph targets of the model `body`, in a worker of its own, as an undo
      * step. Keeps the cage and its poses. Resolves with a sentence about what was copied.
      */
-    dress(id: number, body: number, label: string, hear?: ReadListener): Job<{ readonly report: string }> {
+    copyRig(id: number, body: number, label: string, hear?: ReadListener): Job<{ readonly report: string }> {
       const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];
-      const job = reading("dress", { clothes, body: from, used: engine.texturePixels(id) }, hear);
+      const job = reading("copyRig", { clothes, body: from, used: engine.texturePixels(id) }, hear);
       return chain(ofNow(job), async (read) => {
         const [loaded] = load(pkg, read);
         await engine.replace(id, loaded, label);

@@ -171,7 +171,7 @@ export const PERSON_STATE = {
   /** Cancels the operation that blocks the page; null if it cannot be cancelled. */
   cancelBusy: null as (() => void) | null,
   /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */
-  goOn: null as (() => void) | null,
+  confirmBusy: null as (() => void) | null,
   scene: SCENE_DEFAULTS,
   seeOpen: false,
   /** Whether clicks and taps add to the selection. */

@@ -24,7 +24,7 @@ function page() {
   };
   const files: GuideNeeds["files"] = {
     async openSample(id) {
-      guide.overtaken(id);
+      guide.beforeOpen(id);
       opened.push(id);
       fake.show({ sample: id, sampleCage: true });
       return true;
@@ -91,7 +91,7 @@ it("opening a file ends the tour and restores the settings", async () => {
   const { guide, store, opened } = page();
   const own = store.get().bindOptions;
   await guide.start(STOPS.indexOf("smoothing"));
-  guide.overtaken(null);
+  guide.beforeOpen(null);
   expect(store.get()).toMatchObject({ tour: null, bindOptions: own });
   await guide.end();
   expect(opened, "nothing else is opened").toEqual([]);

@@ -194,7 +194,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     {
       busy: T.opening.fileOf("01", 0, 2),
       busyStep: T.opening.large(12_345_678),
-      goOn: () => {},
+      confirmBusy: () => {},
       cancelBusy: () => {},
     },
     ...of(

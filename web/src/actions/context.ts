@@ -83,15 +83,15 @@ export async function waitFor<T extends object>(
     const read = await job.done;
     const { vertices = 0 } = read as Partial<ReadFile>;
     if (vertices > MAX_UNASKED_VERTICES) {
-      await new Promise<void>((goOn, giveUp) => {
+      await new Promise<void>((confirmBusy, giveUp) => {
         cancelBusy = () => giveUp(cancelled());
         const busyStep = T.opening.large(vertices);
-        store.set({ busyStep, goOn, cancelBusy });
+        store.set({ busyStep, confirmBusy, cancelBusy });
       });
     }
     return read;
   } finally {
-    store.set({ busy: null, busyStep: "", busyFraction: 0, cancelBusy: null, goOn: null });
+    store.set({ busy: null, busyStep: "", busyFraction: 0, cancelBusy: null, confirmBusy: null });
   }
 }
 

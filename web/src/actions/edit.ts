@@ -8,8 +8,8 @@ import { decimals } from "../format";
 import { T } from "../words";
 import { type Context, report } from "./context";
 
-/** Longest interval between two presses of arrow keys that become one undo step, ms. */
-const NUDGE_PAUSE_MS = 600;
+/** Longest interval between two presses of arrow keys that become one undo step, or belong to one pull, ms. */
+export const NUDGE_PAUSE_MS = 600;
 
 export function createEdit(ctx: Context) {
   const { store, engine } = ctx;

@@ -30,7 +30,7 @@ export interface FileNeeds {
   /** Ends playback and operations in progress before something else is opened. */
   settle(): void;
   /** Called before a sample or a file is opened. `sample` is null for a file. */
-  overtaken(sample: string | null): void;
+  beforeOpen(sample: string | null): void;
 }
 
 /**
@@ -156,7 +156,7 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
     along: Partial<Companions>,
   ) => {
     needs.settle();
-    needs.overtaken(sample);
+    needs.beforeOpen(sample);
     await needs.works.flush();
     const opened = await open();
     needs.works.leave();

@@ -82,22 +82,22 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       });
     },
     /** Gives a model the joints, joint weights and morph targets of another one. */
-    dress(id: number, body: number): Promise<boolean> {
+    copyRig(id: number, body: number): Promise<boolean> {
       const name = memberOf(id)?.name ?? "";
       ctx.tell.clear();
-      return attemptLatest(ctx, T.models.notDressed(name), "open", async (signal) => {
+      return attemptLatest(ctx, T.models.rigNotCopied(name), "open", async (signal) => {
         settle();
-        const { report } = await waitFor(ctx, signal, T.models.dressing(name), (hear) =>
-          ctx.session().dress(id, body, T.did.dress(name), hear),
+        const { report } = await waitFor(ctx, signal, T.models.copyingRig(name), (hear) =>
+          ctx.session().copyRig(id, body, T.did.copyRig(name), hear),
         );
         ctx.tell.say(sentence(report));
       });
     },
     /** Removes a model, and remakes the cage. */
-    bin(id: number): boolean {
+    remove(id: number): boolean {
       settle();
-      const label = T.did.binModel(memberOf(id)?.name ?? "");
-      const went = edit.apply({ do: "remove_model", id }, label, T.models.notBinned);
+      const label = T.did.removeModel(memberOf(id)?.name ?? "");
+      const went = edit.apply({ do: "remove_model", id }, label, T.models.notRemoved);
       if (went) remakeCage();
       return went;
     },

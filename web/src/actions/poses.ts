@@ -75,14 +75,14 @@ export function createPoses(ctx: Context, edit: Edit) {
     frame = requestAnimationFrame(step(start));
   };
 
-  let isPortraying = false;
+  let isDrawing = false;
   /**
    * Makes the missing pictures of saved poses, one after the other: that of one pose, or of all. While a picture is
    * drawn, the view cannot be picked.
    */
-  const portray = async (only?: number) => {
-    if (isPortraying) return;
-    isPortraying = true;
+  const drawPictures = async (only?: number) => {
+    if (isDrawing) return;
+    isDrawing = true;
     try {
       for (;;) {
         const { poses, pictures, bound, gesture, playing } = store.get();
@@ -99,7 +99,7 @@ export function createPoses(ctx: Context, edit: Edit) {
     } catch {
       // The cards stay without pictures. The next frame reports a lost device.
     } finally {
-      isPortraying = false;
+      isDrawing = false;
     }
   };
 
@@ -111,13 +111,13 @@ export function createPoses(ctx: Context, edit: Edit) {
       if (moment) engine().apply({ do: "set_pose", positions: moment });
       const name = freshName(store.get().poses);
       if (!edit.apply({ do: "save_pose", name }, T.did.save)) return;
-      void portray(store.get().poses.length - 1);
+      void drawPictures(store.get().poses.length - 1);
       ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(name));
     },
     apply(index: number) {
       edit.setEditingRest(false);
       edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
-      void portray(index);
+      void drawPictures(index);
     },
     rename(index: number, text: string) {
       const name = text.trim().replace(/\s+/g, " ");
@@ -127,9 +127,9 @@ export function createPoses(ctx: Context, edit: Edit) {
     remove: (index: number) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
     /** Replaces a pose by the current one. */
     update(index: number) {
-      if (edit.apply({ do: "update_pose", index }, T.did.update)) void portray(index);
+      if (edit.apply({ do: "update_pose", index }, T.did.update)) void drawPictures(index);
     },
-    portray,
+    drawPictures,
     /** Inserts a copy after the pose. */
     duplicate(index: number) {
       const name = T.did.copyName(store.get().poses[index]?.name ?? "");

@@ -5,7 +5,7 @@ import { clamped, SLIDERS } from "../defaults";
 import { follow } from "../queue";
 import { T } from "../words";
 import { attempt, attemptLatest, type Context } from "./context";
-import type { Edit } from "./edit";
+import { type Edit, NUDGE_PAUSE_MS } from "./edit";
 
 /** Distance of a grabbed point from its target above which the target is shown, as a fraction of the model's size. */
 const MIN_SHOWN_DISTANCE = 0.01;
@@ -13,8 +13,6 @@ const MIN_SHOWN_DISTANCE = 0.01;
 const MAX_SETTLING_FRAMES = 30;
 /** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
 const MAX_LOCAL_REACH = SLIDERS.reach.max / 2;
-/** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
-const NUDGE_PAUSE_MS = 600;
 /** Distances from the middle of the view, CSS pixels, and number of directions, in which `nudge` looks for the model. */
 const SEARCH_RADII = [40, 80, 160, 320];
 const SEARCH_DIRECTIONS = 8;

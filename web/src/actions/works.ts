@@ -208,7 +208,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       return true;
     },
     /** Excludes the work of this tab from automatic opening, because the page crashed with it. */
-    async distrust() {
+    async excludeOwn() {
       const { entries } = await readEntries();
       const entry = entries.find(({ id }) => id === ownId());
       if (entry) await writeEntry({ ...entry, stopped: true });

@@ -70,7 +70,7 @@ function Example({ id }: { id: Id }) {
       { threshold: MIN_VISIBLE_SHARE },
     );
     watch.observe(view.current);
-    dark.addEventListener("change", () => live.current?.dress(theme()));
+    dark.addEventListener("change", () => live.current?.applyTheme(theme()));
   }, []);
 
   return (

@@ -63,13 +63,13 @@ export async function openLive(
     if (clientWidth > 0 && clientHeight > 0)
       engine.resize(clientWidth, clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio));
   };
-  const dress = (theme: SceneOptions["theme"]) =>
+  const applyTheme = (theme: SceneOptions["theme"]) =>
     engine.setScene({ ...SCENE_DEFAULTS, ...seen?.scene, theme });
 
   try {
     resize();
     sizes.observe(holder);
-    dress(theme);
+    applyTheme(theme);
     const { model } = await session.openSample(sample);
     if (!engine.cageState())
       session.takeCage(await session.generateCage(CAGE_DEFAULTS, () => undefined).done);
@@ -100,7 +100,7 @@ export async function openLive(
   };
 
   return {
-    dress,
+    applyTheme,
     /** Moves the example once; if `isStill`, shows only the end of the movement. Draws nothing afterwards. */
     play(isStill: boolean) {
       cancelAnimationFrame(frame);

@@ -189,7 +189,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       const sample = was.sample ?? store.get().samples[0] ?? "";
       const isStill = isOpened(sample);
       if (isStill) rest(undefined);
-      guide.overtaken(null);
+      guide.beforeOpen(null);
       if (was.link.includes("sample=") && !was.work) {
         // Setting the fragment reopens the shared link.
         location.hash = was.link;
@@ -204,7 +204,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       ctx.engine().frameAll();
     },
     /** Called when a sample or file is opened. Unless the tour opened it, ends the tour and restores the settings. */
-    overtaken(sample: string | null) {
+    beforeOpen(sample: string | null) {
       if (!before || (sample !== null && sample === opening)) return;
       turn += 1;
       ctx.queue.cancel("bind");

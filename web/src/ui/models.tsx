@@ -73,19 +73,19 @@ function Row({ app, member, body }: { app: App; member: MemberInfo; body: Member
           <Ways app={app} member={member} part={ALL} label={name} />
           <IconButton
             icon="trash"
-            label={T.models.bin(name)}
+            label={T.models.remove(name)}
             kind="small"
-            onClick={() => void app.models.bin(id)}
+            onClick={() => void app.models.remove(id)}
           />
         </div>
       </div>
       {joints === 0 && body.joints > 0 && (
         <div class="row">
           <Button
-            label={T.models.dress(body.name)}
+            label={T.models.copyRig(body.name)}
             icon="bone"
-            tip={T.models.dressTip(body.name)}
-            onClick={() => void app.models.dress(id, body.id)}
+            tip={T.models.copyRigTip(body.name)}
+            onClick={() => void app.models.copyRig(id, body.id)}
           />
         </div>
       )}

@@ -205,8 +205,8 @@ function Poses({ app }: { app: App }) {
       <ul
         class="poses"
         ref={list}
-        onPointerEnter={() => void app.poses.portray()}
-        onFocusIn={() => void app.poses.portray()}
+        onPointerEnter={() => void app.poses.drawPictures()}
+        onFocusIn={() => void app.poses.drawPictures()}
       >
         {places.map(({ pose, index }, place) => (
           <PoseRow

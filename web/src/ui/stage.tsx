@@ -209,16 +209,16 @@ function Cue({ app }: { app: App }) {
 
 /** Progress of opening a file, with a button to cancel. For a large model, also asks whether to continue. */
 function Busy({ app }: { app: App }) {
-  const { busy, busyStep, busyFraction, cancelBusy, goOn } = app.store.get();
+  const { busy, busyStep, busyFraction, cancelBusy, confirmBusy } = app.store.get();
   return (
     <div class="busy" hidden={busy === null}>
-      {!goOn && <span class="spinner" />}
+      {!confirmBusy && <span class="spinner" />}
       <p>{busy && `${busy}…`}</p>
       <p class="hint">{busyStep}</p>
-      {busyFraction > 0 && !goOn && <progress max="1" value={busyFraction} aria-label={busyStep} />}
+      {busyFraction > 0 && !confirmBusy && <progress max="1" value={busyFraction} aria-label={busyStep} />}
       <div class="row">
         {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" />}
-        {goOn && <Button label={T.opening.anyway} onClick={goOn} kind="small primary" />}
+        {confirmBusy && <Button label={T.opening.anyway} onClick={confirmBusy} kind="small primary" />}
       </div>
     </div>
   );

@@ -37,7 +37,7 @@ function page() {
     view: { tools: (patch) => fake.show({ tools: { ...fake.store.get().tools, ...patch } }) },
     works: { flush: async () => void steps.push("keep"), leave: () => steps.push("leave") },
     settle: () => undefined,
-    overtaken: () => undefined,
+    beforeOpen: () => undefined,
   });
   return { ...fake, files, steps, offers: () => fake.offered };
 }
@@ -131,13 +131,13 @@ it("a file of more than two million vertices needs confirmation", async () => {
   await settled();
   asked[0]?.resolve({ vertices: 2_100_000 });
   await settled();
-  expect([store.get().busyStep, store.get().goOn]).toEqual([
+  expect([store.get().busyStep, store.get().confirmBusy]).toEqual([
     "Large model (2,100,000 vertices): it may need more memory than the browser allows.",
     expect.any(Function),
   ]);
   store.get().cancelBusy?.();
   expect(await opened).toBe(false);
-  expect([store.get().busy, store.get().goOn, problems, asked.length]).toEqual([null, null, [], 1]);
+  expect([store.get().busy, store.get().confirmBusy, problems, asked.length]).toEqual([null, null, [], 1]);
 });
 
 it("a cage file dropped with a model is loaded; an empty file and a drop without models are reported", async () => {

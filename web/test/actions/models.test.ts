@@ -134,14 +134,14 @@ it("adds neither projects nor unknown files; on an empty page the models are ope
 
 it("removing a model is one step; the last one cannot be removed, which is reported", () => {
   const { models, commands, did, problems, teach } = page();
-  expect(models.bin(0)).toBe(true);
+  expect(models.remove(0)).toBe(true);
   expect([commands, did]).toEqual([[{ do: "remove_model", id: 0 }], ["Remove body.glb"]]);
   teach({
     apply: () => {
       throw new Error("this is the only model in the cage");
     },
   });
-  expect([models.bin(0), problems[0]?.title]).toEqual([false, "The model could not be removed"]);
+  expect([models.remove(0), problems[0]?.title]).toEqual([false, "The model could not be removed"]);
 });
 
 it("a model added while a cage is generated restarts it around all models", async () => {

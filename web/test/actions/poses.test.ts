@@ -67,8 +67,8 @@ it("every pose that fits the cage gets a picture, once, unless the list changes 
     asked.at(-1)?.resolve(new Blob());
     await new Promise((done) => setTimeout(done));
   };
-  const all = poses.portray();
-  void poses.portray();
+  const all = poses.drawPictures();
+  void poses.drawPictures();
   expect(wanted(), "one at a time").toEqual([0]);
   show({ poses: [pose(9), pose(7)] });
   await drawn();
@@ -80,7 +80,7 @@ it("every pose that fits the cage gets a picture, once, unless the list changes 
     [0, 0, 1],
     ["7", "9"],
   ]);
-  await poses.portray();
+  await poses.drawPictures();
   expect(wanted().length).toBe(3);
 });
 

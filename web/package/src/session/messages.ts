@@ -140,7 +140,7 @@ export interface Jobs {
    * `Engine.storedModel`; `used`: number of texture pixels of the other models. `report`: a sentence about what was
    * copied.
    */
-  dress: {
+  copyRig: {
     input: { clothes: Uint8Array[]; body: Uint8Array[]; used: number };
     step: Reading;
     output: ReadModel & { readonly report: string };

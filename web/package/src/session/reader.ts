@@ -9,7 +9,7 @@ import type { Jobs, ReadModel } from "./messages";
 
 export type ReadListener = ((progress: Reading) => void) | undefined;
 
-type SeparateRun = <K extends "read" | "readCage" | "check" | "repair" | "dress">(
+type SeparateRun = <K extends "read" | "readCage" | "check" | "repair" | "copyRig">(
   job: K,
   input: Jobs[K]["input"],
   hear?: ReadListener,
@@ -45,7 +45,7 @@ export function createSeparateWorkers(open: () => Client): SeparateWorkers {
       else client.close();
     };
     const what =
-      "files" in input ? "reading this file" : job === "dress" ? "copying the joints" : "checking the cage";
+      "files" in input ? "reading this file" : job === "copyRig" ? "copying the joints" : "checking the cage";
     const done = client.run(job, input, hear).done.catch((error: Error) => {
       if (error.name !== "Worker") throw error;
       throw named(

@@ -24,11 +24,11 @@ export async function readModel(
 }
 
 /** Gives clothes the joints, joint weights and morph targets of a body. */
-export async function dress(
+export async function copyRig(
   pkg: Package,
-  { clothes, body, used }: Jobs["dress"]["input"],
+  { clothes, body, used }: Jobs["copyRig"]["input"],
   tell: ReadListener,
-): Promise<Jobs["dress"]["output"]> {
+): Promise<Jobs["copyRig"]["output"]> {
   const [loaded, from] = [pkg.LoadedModel.restore(clothes), pkg.LoadedModel.restore(body)];
   const report = loaded.takeSkinOf(from);
   from.free();

@@ -13,7 +13,7 @@ import {
   type WorkerReply,
   type WorkerRequest,
 } from "./messages";
-import { check, checked, dress, read, readCage, readModel, readSample } from "./reading";
+import { check, checked, copyRig, read, readCage, readModel, readSample } from "./reading";
 
 /** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
@@ -162,7 +162,7 @@ function createWork(pkg: Package): Work {
       return { ...checked(pkg, cage, model, smooth), bridged, notices };
     },
     read: (input, step) => readModel(pkg, input, step),
-    dress: (input, step) => dress(pkg, input, step),
+    copyRig: (input, step) => copyRig(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
     check: async ({ cage, model }) => check(pkg, cage, model),
     async repair({ kind, cage, model }) {

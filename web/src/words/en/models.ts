@@ -16,11 +16,11 @@ export const models = {
     rigid: "Keeps its shape: moves without bending, like a buckle or an eye",
     stays: "Stays as it is: the cage does not move it",
   },
-  dress: (body: string) => `Rig like ${body}`,
-  dressTip: (body: string) =>
+  copyRig: (body: string) => `Rig like ${body}`,
+  copyRigTip: (body: string) =>
     `Copies the joints, weights and morph targets of ${body}; its clips then move this model`,
-  dressing: (name: string) => `Copying joints to ${name}`,
-  bin: (name: string) => `Remove ${name} from the cage`,
+  copyingRig: (name: string) => `Copying joints to ${name}`,
+  remove: (name: string) => `Remove ${name} from the cage`,
   is: { hidden: "hidden", rigid: "keeps its shape", stays: "stays as it is", painted: "painted" },
   some: (rigid: number, stays: number) =>
     [
@@ -48,8 +48,8 @@ export const models = {
   showList: "Show the list",
   notAdded: "Nothing was added",
   noProject: "A project has its own cage. Open it, or add its models' files instead.",
-  notDressed: (name: string) => `${name} could not be rigged`,
-  notBinned: "The model could not be removed",
+  rigNotCopied: (name: string) => `${name} could not be rigged`,
+  notRemoved: "The model could not be removed",
   notPainted: "The model cannot be painted now",
   notParts: "How this part follows the cage could not be changed",
   painting: "Painting fixed areas",

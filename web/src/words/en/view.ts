@@ -45,7 +45,7 @@ export const status = {
   broken: "The cage has faults; step Cage lists them",
   capture: "Preparing the capture to follow the cage",
   selected: (last: number) => `Cage vertex ${last} selected`,
-  innerSelected: (last: number) => `Inner control ${last} selected`,
+  innerSelected: (last: number) => `Control ${last} inside the cage selected`,
   placing: {
     point: "Click the model to put a point there",
     line: "Click each corner of the bone, then Done",
