@@ -205,7 +205,7 @@ pub(crate) struct DeformArgs {
     /// a custom one. The model stays at rest, and gets an animation only with --times or --interpolation.
     #[arg(long, requires = "output", conflicts_with_all = ["dynamic", "shape_only"])]
     pub(crate) expression: bool,
-    /// Moved inner controls (.obj): the same vertices in the same order. Give one per --pose, or none if they do not move.
+    /// Moved controls inside the cage (.obj): the same vertices in the same order. Give one per --pose, or none if they do not move.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose_controls: Vec<PathBuf>,
     /// File to write; the extension selects the format.

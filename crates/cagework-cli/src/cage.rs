@@ -100,7 +100,7 @@ fn enclosed(args: &CageArgs) -> Result<CageInput, CliError> {
             all.origin = model.origin();
         }
         let n_notices = model.notices.len();
-        model.see_from(all.origin);
+        model.set_origin(all.origin);
         all.notices.extend(model.notices[n_notices..].iter().map(|n| format!("{}: {n}", shown(&model.name))));
         let (positions, triangles) = match states_of(&model, args.around_clip.as_deref()) {
             Ok(states) => {

@@ -85,7 +85,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         row("smooth", format!("{} steps of subdivision", report.smooth));
     }
     if report.held_vertices > 0 {
-        row("held", format!("{} vertices inside inner controls", report.held_vertices));
+        row("held", format!("{} vertices attached to controls inside", report.held_vertices));
     }
 
     if !report.converged {

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let of_cage = load(&args.cage)?;
     let mut cage = cage_mesh(&of_cage).map_err(refused)?;
     let mut model = args.mesh.as_deref().map(load).transpose()?;
-    model.iter_mut().for_each(|model| model.see_from(of_cage.origin()));
+    model.iter_mut().for_each(|model| model.set_origin(of_cage.origin()));
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let smooth = args.smooth.smooth;
     let mut summary = CheckSummary {

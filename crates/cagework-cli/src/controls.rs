@@ -85,9 +85,9 @@ pub(crate) fn with_inner(
                 "{}: has {}, but {} bound",
                 shown_path(path),
                 counted(positions.len(), "vertex", "vertices"),
-                counted(rest.len(), "inner control was", "inner controls were")
+                counted(rest.len(), "control inside was", "controls inside were")
             ),
-            hint: "the pose of inner controls is their file with moved vertices: same number, same order",
+            hint: "the pose of controls inside is their file with moved vertices: same number, same order",
         })
     };
     let inner: Vec<Vec<Vec3>> = files.iter().map(inner).collect::<Result<_, _>>()?;
@@ -100,11 +100,11 @@ pub(crate) fn rest_of(cage: &Cage, saved: &SavedWeights) -> Vec<Vec3> {
     [cage.positions(), &saved.inner_controls].concat()
 }
 
-/// Returns text such as " and 2 inner controls", which follows the number of cage vertices; empty if `n` is 0.
+/// Returns text such as " and 2 controls inside", which follows the number of cage vertices; empty if `n` is 0.
 pub(crate) fn inner_controls_text(n: usize) -> String {
     match n {
         0 => String::new(),
-        1 => " and 1 inner control".into(),
-        n => format!(" and {n} inner controls"),
+        1 => " and 1 control inside".into(),
+        n => format!(" and {n} controls inside"),
     }
 }

@@ -165,7 +165,7 @@ pub(crate) fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<(Cage,
     if !args.pose_controls.is_empty() {
         return Err(CliError::Mismatch {
             message: "a lattice, splats and points do not take --pose-controls".into(),
-            hint: "`cagework map` takes inner controls",
+            hint: "`cagework map` takes controls inside the cage",
         });
     }
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };

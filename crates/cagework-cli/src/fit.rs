@@ -70,7 +70,7 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     let Goals { weights, importance, to, notices } = match (&given.target, &given.landmarks) {
         (Some(path), _) => {
             let mut target = load_model(path, args.read.axis(), args.read.memory)?;
-            target.see_from(bound.model.origin());
+            target.set_origin(bound.model.origin());
             vertices(&bound, target, pull.areas())?
         }
         (None, Some(path)) => landmarks(&bound, path)?,

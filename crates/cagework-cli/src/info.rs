@@ -108,7 +108,7 @@ struct InnerInfo {
 impl std::fmt::Display for InnerInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { file, vertices, points, lines, faces, .. } = self;
-        writeln!(f, "{} (OBJ), inner controls for `cagework bind --controls`", shown(file))?;
+        writeln!(f, "{} (OBJ), controls inside a cage for `cagework bind --controls`", shown(file))?;
         let elements = [
             counted(*points, "point", "points"),
             counted(*lines, "line", "lines"),

@@ -156,7 +156,7 @@ pub(crate) fn load_cage_file(
     controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
     let mut model = load_model(path, up, memory)?;
-    model.see_from(origin.unwrap_or(model.origin()));
+    model.set_origin(origin.unwrap_or(model.origin()));
     LoadedCage::new(model, up, memory, controls)
 }
 
@@ -274,7 +274,7 @@ impl LoadedCage {
     /// If the file cannot be read, or has another number of vertices than the cage.
     pub(crate) fn load_states(&self, path: &Path) -> Result<Vec<PoseState>, CliError> {
         let mut pose = load_any(path, self.up, self.memory)?;
-        pose.see_from(self.model.origin());
+        pose.set_origin(self.model.origin());
         let states = self.model.pose_states(&pose)?;
         if !states.is_empty() {
             return Ok(states);

@@ -93,7 +93,7 @@ impl BoundModel {
                 message: format!(
                     "{}: was bound with {}, but {} given, or at other positions",
                     shown_path(path),
-                    counted(inner_controls.len(), "inner control", "inner controls"),
+                    counted(inner_controls.len(), "control inside", "controls inside"),
                     counted(inner.len(), "was", "were")
                 ),
                 hint: "give the same --controls and --smooth as for `cagework bind`",

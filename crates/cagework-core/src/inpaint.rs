@@ -63,7 +63,8 @@ pub struct Inpainting {
 }
 
 impl Inpainting {
-    /// Matches the vertices of `target` to points of `source`.
+    /// Matches the distinct positions of `target` to points of `source`. Positions without a match continue the values
+    /// of their neighbours, or take those of the closest point if no match is connected to them.
     #[must_use]
     pub fn new(source: &TriMesh, target: &TriMesh) -> Self {
         let (source_seams, _, source_normals) = welded(source);
@@ -126,7 +127,8 @@ impl Inpainting {
         self.origins
     }
 
-    /// Copies `values`, `[n_source_vertices][n_columns]`, to the distinct positions. Returns `[n_positions][n_columns]`.
+    /// Interpolates `values`, `[n_source_vertices][n_columns]`, at the matched positions and continues them smoothly to
+    /// the others. Continued values may lie outside the range of `values`. Returns `[n_positions][n_columns]`.
     #[must_use]
     pub fn values(&self, values: &[f32], n_columns: usize) -> Vec<f32> {
         let n = n_columns;
@@ -142,7 +144,8 @@ impl Inpainting {
         all
     }
 
-    /// Copies non-negative `values`, such as joint weights, to all vertices. Returns `[n_vertices][n_columns]`, not negative.
+    /// As [`Self::values`] for non-negative `values`, such as joint weights, but for all vertices and not negative.
+    /// Returns `[n_vertices][n_columns]`.
     #[must_use]
     pub fn weights(&self, values: &[f32], n_columns: usize) -> Vec<f32> {
         let all = self.values(values, n_columns);

@@ -33,7 +33,7 @@ pub enum RestEdit {
     CollapseEdge,
     /// Extrudes selected faces outwards.
     ExtrudeFace,
-    /// Removes selected vertices and closes the holes. If interior controls are selected, removes only those.
+    /// Removes selected vertices and closes the holes. If inner controls are selected, removes only those.
     DeleteVertex,
     /// Removes selected faces and closes the holes.
     DeleteFace,
@@ -44,9 +44,9 @@ pub enum RestEdit {
 #[serde(tag = "do", rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Command {
-    /// Moves the cage's vertices and interior controls.
+    /// Moves the cage's vertices and inner controls.
     SetPose {
-        /// Positions of cage vertices, then of interior controls, object units. `[n_controls]`
+        /// Positions of cage vertices, then of inner controls, object units. `[n_controls]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
     },
@@ -141,10 +141,10 @@ pub enum Command {
     },
     /// Replaces the cage by another cage, or by a mesh that is not a valid cage yet. The new cage is at rest.
     ReplaceCage {
-        /// Positions of the vertices of the new cage, then of its interior controls, and the cage's faces.
+        /// Positions of the vertices of the new cage, then of its inner controls, and the cage's faces.
         #[cfg_attr(feature = "typescript", ts(type = "unknown"))]
         mesh: PolygonMesh,
-        /// Subdivision and interior controls; null keeps the current ones if they fit.
+        /// Subdivision and inner controls; null keeps the current ones if they fit.
         controls: Option<CageControls>,
         /// Notices of the cage generator about the new cage.
         notices: Vec<String>,
@@ -167,7 +167,7 @@ pub enum Command {
         /// Radius, object units; null for 1/32 of the cage's longest side.
         radius: Option<f32>,
     },
-    /// Adds an interior control, and selects it.
+    /// Adds an inner control, and selects it.
     AddControl {
         /// A point, a polyline through `places`, or a sheet with corners at `places`.
         kind: InnerKind,
@@ -184,7 +184,7 @@ pub enum Command {
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         axes: [Vec3; 2],
     },
-    /// Replaces the interior controls.
+    /// Replaces the inner controls.
     ReplaceControls {
         /// Positions of the new controls, object units. `[n_inner]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
@@ -498,7 +498,7 @@ impl Editor {
         Ok(())
     }
 
-    /// Replaces the cage by `cage`, which has one more interior control, and selects this control.
+    /// Replaces the cage by `cage`, which has one more inner control, and selects this control.
     fn add_control(&mut self, cage: RestCage) {
         let first = cage.n_cage() as u32;
         let corners = cage.controls.elements.last().map(|element| element.corners().to_vec());

@@ -1,6 +1,6 @@
-//! The cage at rest, with its subdivision and its interior controls.
+//! The cage at rest, with its subdivision and its inner controls.
 //!
-//! Interior controls are the corners of points, lines and sheets inside the cage. They are the last of the cage's
+//! Inner controls are the corners of points, lines and sheets inside the cage. They are the last of the cage's
 //! positions and belong to no face. Selection, gestures, poses, undo and projects treat them like the cage's vertices.
 
 use cagework_core::{
@@ -11,22 +11,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EditError;
 
-/// Subdivision and interior controls of a cage.
+/// Subdivision and inner controls of a cage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageControls {
     /// Number of subdivision steps from the cage to its smooth surface.
     pub smooth: u32,
-    /// Number of interior controls, which are the last of the cage's positions.
+    /// Number of inner controls, which are the last of the cage's positions.
     pub inner: usize,
-    /// Points, lines and faces; indices are relative to the first interior control.
+    /// Points, lines and faces; indices are relative to the first inner control.
     pub elements: Vec<InnerElement>,
     /// Radius of points and lines, object units; null for 1/32 of the cage's longest side.
     pub radius: Option<f32>,
 }
 
-/// A kind of interior control.
+/// A kind of inner control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -49,16 +49,16 @@ impl InnerKind {
     }
 }
 
-/// A cage at rest with its interior controls, or a draft that is not a valid cage yet.
+/// A cage at rest with its inner controls, or a draft that is not a valid cage yet.
 #[derive(Clone, Debug)]
 pub struct RestCage {
-    /// Positions of the cage's vertices, then of interior controls; faces of the cage.
+    /// Positions of the cage's vertices, then of inner controls; faces of the cage.
     pub mesh: PolygonMesh,
-    /// Subdivision and interior controls.
+    /// Subdivision and inner controls.
     pub controls: CageControls,
     /// The controls of a bind, or why the mesh is not a valid cage.
     pub set: Result<ControlSet, CageError>,
-    /// Notices about interior controls that were dropped because they do not fit, and notices of the generator.
+    /// Notices about inner controls that were dropped because they do not fit, and notices of the generator.
     pub notices: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ impl Default for RestCage {
 }
 
 impl RestCage {
-    /// Creates a cage from a mesh whose last positions are the interior controls.
+    /// Creates a cage from a mesh whose last positions are the inner controls.
     ///
     /// # Errors
     /// If a position is not finite, an index does not exist, or the controls do not fit into the cage.
@@ -110,7 +110,7 @@ impl RestCage {
         Ok(Self { mesh, controls, set, notices: Vec::new() })
     }
 
-    /// Returns `cage` with the subdivision and the interior controls of this cage. If they do not fit, keeps only the
+    /// Returns `cage` with the subdivision and the inner controls of this cage. If they do not fit, keeps only the
     /// subdivision, or neither, and adds a notice.
     ///
     /// # Errors
@@ -136,12 +136,12 @@ impl RestCage {
         Ok(Self { notices, ..made? })
     }
 
-    /// Positions of interior controls, object units. `[n_inner]`
+    /// Positions of inner controls, object units. `[n_inner]`
     pub fn inner_positions(&self) -> &[Vec3] {
         &self.mesh.positions[self.n_cage()..]
     }
 
-    /// Number of vertices of the cage, without interior controls.
+    /// Number of vertices of the cage, without inner controls.
     pub fn n_cage(&self) -> usize {
         self.mesh.positions.len().saturating_sub(self.controls.inner)
     }
@@ -170,7 +170,7 @@ impl RestCage {
         Self::new(mesh, controls)
     }
 
-    /// Removes interior controls, and the points and sheets that use them. Polylines keep their other points if at
+    /// Removes inner controls, and the points and sheets that use them. Polylines keep their other points if at
     /// least two are left.
     ///
     /// # Errors

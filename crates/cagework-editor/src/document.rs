@@ -17,7 +17,7 @@ use crate::surface::SurfacePoint;
 pub struct NamedPose {
     /// Name of the pose, as lists show it.
     pub name: Arc<str>,
-    /// Positions of the vertices and interior controls of the cage that the pose was saved for. `[n_controls]`
+    /// Positions of the vertices and inner controls of the cage that the pose was saved for. `[n_controls]`
     pub positions: Arc<[Vec3]>,
     /// Identifies the cage that the pose was saved for, see [`DocumentView::cage_id`](crate::DocumentView::cage_id); `None` if
     /// it is unknown.
@@ -62,7 +62,7 @@ pub struct Document {
     pub models: Models,
     /// The cage at rest.
     pub cage: Arc<RestCage>,
-    /// Posed positions of cage vertices and interior controls; during reshaping, the new rest positions. `[n_controls]`
+    /// Posed positions of cage vertices and inner controls; during reshaping, the new rest positions. `[n_controls]`
     pub pose: Arc<[Vec3]>,
     /// Saved poses, in their order in lists and in the animation.
     pub poses: Arc<Vec<NamedPose>>,
@@ -74,7 +74,7 @@ pub struct Document {
     pub pins: Arc<[SurfacePoint]>,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<Arc<str>>,
-    /// Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
+    /// Whether the cage is the built-in one of `sample`; smoothing and inner controls may differ.
     pub has_sample_cage: bool,
     /// Identifies the joined mesh of the models: documents with equal keys have equal meshes.
     pub(crate) mesh_key: u64,

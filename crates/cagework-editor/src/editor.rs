@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cagework_core::view::View;
 use cagework_core::{Bounds, PolygonMesh};
 use cagework_io::{Model, write_project};
-use cagework_pose::blend::{PoseError, blend};
+use cagework_pose::blend::{VertexCountError, blend};
 use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
@@ -39,7 +39,7 @@ pub struct Editor {
     /// Whether a model was painted since the last step.
     is_painting: bool,
     gesture: Option<Gesture>,
-    /// Selected vertices of the cage and its interior controls.
+    /// Selected vertices of the cage and its inner controls.
     pub selection: Selection,
     /// Vertices of the element under the pointer.
     pub hovered: Vec<u32>,
@@ -294,7 +294,7 @@ impl Editor {
         self.document.models_key
     }
 
-    /// Faces and edges of the cage, and edges of interior controls.
+    /// Faces and edges of the cage, and edges of inner controls.
     #[must_use]
     pub fn topology(&self) -> &Topology {
         &self.topology
@@ -316,7 +316,7 @@ impl Editor {
         }
     }
 
-    /// The cage without interior controls, at rest or as reshaped so far.
+    /// The cage without inner controls, at rest or as reshaped so far.
     #[must_use]
     pub fn cage_as_shown(&self) -> PolygonMesh {
         let cage = &self.document.cage;
@@ -358,7 +358,7 @@ impl Editor {
     pub fn set_pose(&mut self, positions: Vec<Vec3>) -> Result<(), EditError> {
         let (given, expected) = (positions.len(), self.document.pose.len());
         if given != expected {
-            return Err(PoseError { given, expected }.into());
+            return Err(VertexCountError { given, expected }.into());
         }
         if !positions.iter().all(|p| p.is_finite()) {
             return Err(EditError::NotFinite { what: "positions" });

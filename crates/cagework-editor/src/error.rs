@@ -2,7 +2,7 @@
 
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, TimelineError, WriteError};
-use cagework_pose::blend::PoseError;
+use cagework_pose::blend::VertexCountError;
 use thiserror::Error;
 
 use crate::rest_edit::RestEditError;
@@ -64,7 +64,7 @@ pub enum EditError {
     },
     /// The positions belong to another cage.
     #[error(transparent)]
-    Pose(#[from] PoseError),
+    Pose(#[from] VertexCountError),
     /// The animation cannot show a pose at this time.
     #[error(transparent)]
     Time(#[from] TimelineError),

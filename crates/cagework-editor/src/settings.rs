@@ -22,7 +22,7 @@ pub struct DocumentSettings {
     /// Identifier of the built-in sample that the cage belongs to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
-    /// Subdivision and interior controls. The last positions of the project's cage mesh are those of the controls.
+    /// Subdivision and inner controls. The last positions of the project's cage mesh are those of the controls.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controls: Option<CageControls>,
     /// The pose in the axes of the model's file: [`cagework_io::position_bytes`] in URL-safe base 64. In older projects
@@ -127,7 +127,7 @@ impl DocumentSettings {
         match self.controls.clone().map(with) {
             Some(Ok(cage)) => (Some(cage), None),
             Some(Err(_)) => {
-                let notice = "The smooth surface or the interior controls of this project's cage cannot be used: they are left out.";
+                let notice = "The smooth surface or the controls inside this project's cage cannot be used: they are left out.";
                 (with(CageControls::default()).ok(), Some(notice))
             }
             None => (with(CageControls::default()).ok(), None),

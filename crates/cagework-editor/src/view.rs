@@ -36,7 +36,7 @@ pub struct DocumentView {
     pub editing_rest: bool,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<String>,
-    /// Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
+    /// Whether the cage is the built-in one of `sample`; smoothing and inner controls may differ.
     pub sample_cage: bool,
     /// Number, last vertex and centre of the selected vertices.
     pub selected: SelectionView,

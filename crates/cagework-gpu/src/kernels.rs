@@ -1,11 +1,11 @@
 //! Table of the compute shaders, each with its bindings and workgroup size. `tests/shaders.rs` compares it with the
 //! WGSL files.
 
-use Binding::{Read, ReadWrite, Uniform};
+use BindingType::{Read, ReadWrite, Uniform};
 
 /// Type of a binding. The bindings of a kernel are in group 0, numbered in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Binding {
+pub enum BindingType {
     /// `var<uniform>`: the dispatch's [`crate::layout::Work`] at a dynamic offset.
     Uniform,
     /// `var<storage, read>`.
@@ -24,7 +24,7 @@ pub struct Kernel {
     /// Number of invocations per workgroup. All kernels are one-dimensional.
     pub workgroup: u32,
     /// Bindings, in order.
-    pub bindings: &'static [Binding],
+    pub bindings: &'static [BindingType],
     /// Approximate memory accesses per invocation, for sizing slices of work.
     pub cost: u32,
 }

@@ -3,7 +3,7 @@
 use std::num::NonZeroU64;
 use std::sync::{Arc, OnceLock};
 
-use crate::kernels::{ALL, Binding, Kernel};
+use crate::kernels::{ALL, BindingType, Kernel};
 use crate::layout::Work;
 
 /// Pipelines of all kernels, in the order of the kernel table, created on first use. Clones share the pipelines.
@@ -94,11 +94,11 @@ impl Pipeline {
                 visibility: wgpu::ShaderStages::COMPUTE,
                 ty: wgpu::BindingType::Buffer {
                     ty: match kind {
-                        Binding::Uniform => wgpu::BufferBindingType::Uniform,
-                        Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                        Binding::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                        BindingType::Uniform => wgpu::BufferBindingType::Uniform,
+                        BindingType::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        BindingType::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
                     },
-                    has_dynamic_offset: *kind == Binding::Uniform,
+                    has_dynamic_offset: *kind == BindingType::Uniform,
                     min_binding_size: None,
                 },
                 count: None,

@@ -4,7 +4,7 @@
 use std::mem::{offset_of, size_of};
 
 use cagework_core::stencil;
-use cagework_gpu::kernels::{self, ALL, Binding, Kernel};
+use cagework_gpu::kernels::{self, ALL, BindingType, Kernel};
 use cagework_gpu::layout::{Work, mode};
 use cagework_gpu::render::shaders::ALL as DRAWN;
 use cagework_gpu::splats::{BINS, Depths, FLOATER, MIRROR};
@@ -30,7 +30,7 @@ fn shaders_are_baseline_webgpu() {
         Validator::new(ValidationFlags::all(), Capabilities::empty())
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(kernel.wgsl, kernel.name)));
-        let n_storage = kernel.bindings.iter().filter(|b| **b != Binding::Uniform).count();
+        let n_storage = kernel.bindings.iter().filter(|b| **b != BindingType::Uniform).count();
         assert!(n_storage <= MAX_STORAGE_BUFFERS, "{}: {n_storage} storage buffers", kernel.name);
         assert!(kernel.workgroup <= MAX_INVOCATIONS, "{}: {} invocations", kernel.name, kernel.workgroup);
     }
@@ -50,11 +50,11 @@ fn bindings_and_workgroups_equal_the_table() {
             .filter_map(|(_, variable)| {
                 let binding = variable.binding?;
                 let kind = match variable.space {
-                    AddressSpace::Uniform => Binding::Uniform,
+                    AddressSpace::Uniform => BindingType::Uniform,
                     AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
-                        Binding::ReadWrite
+                        BindingType::ReadWrite
                     }
-                    AddressSpace::Storage { .. } => Binding::Read,
+                    AddressSpace::Storage { .. } => BindingType::Read,
                     space => panic!("{}: a binding in {space:?}", kernel.name),
                 };
                 Some((binding.group, binding.binding, kind))

@@ -275,7 +275,7 @@ impl Model {
 
     /// Makes the positions relative to another origin, in the file's axes. Cages and poses take their model's
     /// origin. Adds a notice if the model is so far from `origin` that f32 rounds its positions noticeably.
-    pub fn see_from(&mut self, origin: DVec3) {
+    pub fn set_origin(&mut self, origin: DVec3) {
         if origin != self.origin {
             let from = |p: &Vec3| relative(self.origin + p.as_dvec3(), origin);
             let positions: Vec<Vec3> = self.positions_in_file().iter().map(from).collect();

@@ -186,7 +186,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         .map_err(|_| damaged("its origin is not three numbers"))?;
     let origin = DVec3::from_array(origin.unwrap_or_default());
     let place = |model: &mut Model| {
-        model.see_from(origin);
+        model.set_origin(origin);
         model.set_up(up);
         let is_finite = model.positions.iter().all(|p| p.is_finite());
         is_finite.then_some(()).ok_or(damaged("its origin is too far from its models"))

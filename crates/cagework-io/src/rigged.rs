@@ -18,7 +18,7 @@ use crate::siblings::Resolve;
 use crate::timeline::Timeline;
 
 /// Limit on the times of a clip at which a generated cage encloses the model.
-const MAX_CLIP_TIMES: usize = 32;
+pub const MAX_CLIP_TIMES: usize = 32;
 /// Limit on the vertices at all these times together. Models with more than 524,288 vertices are enclosed at fewer
 /// times.
 const MAX_CLIP_VERTICES: usize = 1 << 24;
@@ -207,7 +207,7 @@ impl Model {
     /// Lifts or lowers a model that is written without its rig: by the lift of [`ReshapeOptions::skeleton`], if it has
     /// one. Otherwise, with [`ReshapeOptions::ground`], the lowest point returns to its height at rest. `posed`:
     /// `[n_vertices]`.
-    pub fn stand(&self, posed: &mut [Vec3], options: &ReshapeOptions) {
+    pub fn lift(&self, posed: &mut [Vec3], options: &ReshapeOptions) {
         let own = options.ground.then(|| self.ground(posed));
         let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground());
         let lift = shared.or(own.as_ref()).map_or(0.0, Ground::lift) as f32;
@@ -382,7 +382,7 @@ mod tests {
         let model = Model::read("a.obj", text, &mut |_| None).unwrap();
         for (ground, lowest) in [(false, 1.5), (true, 1.0)] {
             let mut posed: Vec<Vec3> = model.positions.iter().map(|p| 1.5 * *p).collect();
-            model.stand(&mut posed, &ReshapeOptions { ground, ..ReshapeOptions::default() });
+            model.lift(&mut posed, &ReshapeOptions { ground, ..ReshapeOptions::default() });
             assert_eq!(posed[0].y, lowest);
             assert_eq!(posed[2] - posed[0], Vec3::new(0.0, 3.0, 0.0));
         }

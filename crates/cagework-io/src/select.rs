@@ -59,7 +59,7 @@ fn listed(names: &[String]) -> String {
 
 impl Model {
     /// Deforms the vertices of a model that is written without its rig: with the parts of `options` kept in place or
-    /// rigid, then lifted by [`Self::stand`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
+    /// rigid, then lifted by [`Self::lift`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
     /// weighted sums, which would add rounding.
     ///
     /// `weights`, `frames`: results of binding the model's vertices. `rest`, `posed`: `[n_controls]`, object units.
@@ -81,7 +81,7 @@ impl Model {
             let parts = &options.parts;
             if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
         };
-        self.stand(&mut deformed, options);
+        self.lift(&mut deformed, options);
         deformed
     }
 

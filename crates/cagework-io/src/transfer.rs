@@ -115,7 +115,7 @@ impl Model {
         let clothes = self.as_gltf()?;
         let mut model = Self::read_within(&clothes.name, glb, &mut |_| None, memory_limit)?;
         model.set_up(self.up);
-        model.see_from(self.origin);
+        model.set_origin(self.origin);
         // The order of the vertices changes if nodes share a mesh. Otherwise keep positions, which skinning rounds.
         if let (Document::Gltf(own), Document::Gltf(original)) = (&model.document, &clothes.document) {
             let order = own.vertices_in(original);
@@ -137,7 +137,7 @@ impl Model {
         options: &TransferOptions,
     ) -> Result<(Vec<u8>, TransferReport), TransferError> {
         let mut clothes = self.as_gltf()?.into_owned();
-        clothes.see_from(body.origin);
+        clothes.set_origin(body.origin);
         let no_skin = || TransferError::NoSkin(body.name.clone());
         let (Document::Gltf(skeleton), Some(player)) = (&body.document, body.player()?) else {
             return Err(no_skin());
@@ -235,7 +235,7 @@ impl Model {
     fn reread(&self, glb: &[u8]) -> Result<Self, TransferError> {
         let mut model = Self::read(&format!("{}.glb", self.name), glb, &mut |_| None)?;
         model.set_up(self.up);
-        model.see_from(self.origin);
+        model.set_origin(self.origin);
         Ok(model)
     }
 

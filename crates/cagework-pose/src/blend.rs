@@ -6,7 +6,7 @@ use thiserror::Error;
 /// The pose has the wrong number of vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the pose has {given} vertices, but the cage has {expected}: it belongs to another cage")]
-pub struct PoseError {
+pub struct VertexCountError {
     /// Number of vertices of the pose.
     pub given: usize,
     /// Number of vertices of the cage.
@@ -18,12 +18,12 @@ pub struct PoseError {
 /// missing share counts as 0.
 ///
 /// # Errors
-/// [`PoseError`] if a pose and the cage differ in their number of vertices.
-pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<Vec3>, PoseError> {
+/// [`VertexCountError`] if a pose and the cage differ in their number of vertices.
+pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<Vec3>, VertexCountError> {
     let mut mixed = rest.to_vec();
     for (k, pose) in poses.iter().enumerate() {
         if pose.len() != rest.len() {
-            return Err(PoseError { given: pose.len(), expected: rest.len() });
+            return Err(VertexCountError { given: pose.len(), expected: rest.len() });
         }
         let share = shares.get(k).copied().unwrap_or(0.0);
         for ((mixed, &pose), &rest) in mixed.iter_mut().zip(pose).zip(rest) {
@@ -37,14 +37,14 @@ pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<V
 /// made after the blend are kept. `[n_cage]`
 ///
 /// # Errors
-/// [`PoseError`] if a pose and the cage differ in their number of vertices.
+/// [`VertexCountError`] if a pose and the cage differ in their number of vertices.
 pub fn reblend(
     rest: &[Vec3],
     poses: &[Vec<Vec3>],
     from: &[Vec3],
     before: &[f32],
     shares: &[f32],
-) -> Result<Vec<Vec3>, PoseError> {
+) -> Result<Vec<Vec3>, VertexCountError> {
     let more = |(k, share): (usize, &f32)| share - before.get(k).copied().unwrap_or(0.0);
     let change: Vec<f32> = shares.iter().enumerate().map(more).collect();
     let moved = blend(rest, poses, &change)?;
@@ -62,7 +62,10 @@ mod tests {
         let mixed = blend(&rest, &poses, &[0.5, 1.0]);
         assert_eq!(mixed, Ok(vec![Vec3::new(2.0, 5.0, 1.0)]));
         assert_eq!(blend(&rest, &poses, &[]), Ok(rest.to_vec()));
-        assert_eq!(blend(&rest, &[vec![Vec3::ZERO; 2]], &[1.0]), Err(PoseError { given: 2, expected: 1 }));
+        assert_eq!(
+            blend(&rest, &[vec![Vec3::ZERO; 2]], &[1.0]),
+            Err(VertexCountError { given: 2, expected: 1 })
+        );
     }
 
     #[test]

@@ -110,7 +110,8 @@ pub(crate) fn finite_points<'py>(
 /// Reads points `[n, 3]` relative to an origin near them. Also returns this origin, which is zero unless the points are
 /// far away.
 ///
-/// # Errors The errors of [`points`].
+/// # Errors
+/// The errors of [`points`].
 pub(crate) fn points_and_origin<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -256,7 +257,8 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
 /// Adds `outside`, `frames` and `offsets` to a report. Splits the offset columns off the weights, and returns the
 /// weights of the controls.
 ///
-/// # Errors The errors of [`matrix_of`], if the weights have offset columns.
+/// # Errors
+/// The errors of [`matrix_of`], if the weights have offset columns.
 pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
     let (py, Binding { weights, frames, outside, .. }) = (report.py(), binding);
     let points = PyDict::new(py);

@@ -33,7 +33,7 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// Returns (weights, report). weights: scipy.sparse.csr_array [n_points, n_cage] of float32; the rows of points inside sum to 1. report: dict with
 /// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and the other entries that
 /// `cagework bind --report` writes; outside: arrays vertex [k], distance [k] (object units) and share [k] of the points outside the
-/// cage. If points are outside, or near inner controls, it also has offsets (csr_array) and frames, which deform uses.
+/// cage. If points are outside, or near controls inside the cage, it also has offsets (csr_array) and frames, which deform uses.
 ///
 /// Options, as for `cagework bind`: grid=64 (cells along the longest side, 8 to 512), method="embedded" or "classic",
 /// solver="multigrid", "jacobi" or "cg", preconditioner="none" or "v_cycle", cell_shape="box" or "cubic",

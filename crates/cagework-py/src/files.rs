@@ -134,7 +134,7 @@ pub(crate) fn read_model<'py>(
         let is_alone = sources.len() == 1;
         for source in &sources {
             let mut model = source.read()?;
-            model.see_from(*origin.get_or_insert(model.origin()));
+            model.set_origin(*origin.get_or_insert(model.origin()));
             // In a list, a model that lacks the clip contributes no frames.
             let clip = clip.as_deref().filter(|clip| is_alone || Clip::named(&model.clips(), clip).is_ok());
             let (own, corners) = if states {

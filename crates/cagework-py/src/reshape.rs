@@ -192,7 +192,7 @@ impl Request {
             of_rig.skeleton = Some(Arc::new(self.skeleton(body, controls, posed, options, progress)?));
         }
         let mut model = source.read_for(of_rig.skeleton.is_some(), options.memory_limit)?;
-        model.see_from(self.origin);
+        model.set_origin(self.origin);
         let format = if matches!(poses, Poses::Targets(_)) { ModelFormat::Gltf } else { model.format() };
         self.size.require(format).map_err(error::option)?;
         if of_rig.expressions && model.vrm().is_none() {
@@ -267,7 +267,7 @@ impl Request {
         progress: &dyn Progress,
     ) -> PyResult<Skeleton> {
         let mut model = body.read_within(options.memory_limit)?;
-        model.see_from(self.origin);
+        model.set_origin(self.origin);
         if !model.is_rigged() {
             let name = &model.name;
             let message = format!("{name} has no skeleton: give the body that the models were made for");

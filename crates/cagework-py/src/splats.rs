@@ -99,7 +99,7 @@ impl Splats {
     /// True
     fn deformed(&self, py: Python<'_>, field: &Bound<'_, Field>) -> PyResult<Self> {
         let (field, mut model) = (field.get(), (*self.model).clone());
-        model.see_from(field.origin());
+        model.set_origin(field.origin());
         let rest = self.seen_from(field);
         let splats = work::run(py, |_| rest.deformed(field.core()))?;
         Ok(Self { model: Arc::new(model), splats })

@@ -111,7 +111,7 @@ impl LoadedModel {
     pub fn see_from(&mut self, origin: &[f64]) -> Result<(), JsValue> {
         let origin: [f64; 3] =
             origin.try_into().map_err(|_| Fault::new(ErrorName::Error, "origin must be three numbers"))?;
-        self.model.see_from(DVec3::from_array(origin));
+        self.model.set_origin(DVec3::from_array(origin));
         if self.model.positions.iter().all(|p| p.is_finite()) {
             return Ok(());
         }

@@ -69,7 +69,7 @@ impl Puller {
     /// `[n_vertices]`
     pub fn stays(&self) -> Vec<f32> {
         self.drag.as_ref().map_or_else(Vec::new, |drag| {
-            (0..drag.walks().len() as u32).map(|v| drag.stays(v) as f32).collect()
+            (0..drag.distances().len() as u32).map(|v| drag.stays(v) as f32).collect()
         })
     }
 

@@ -28,7 +28,7 @@ pub(crate) struct MapArgs {
     /// Moved cage: the same vertices in the same order.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose: PathBuf,
-    /// Moved inner controls (.obj): the same vertices in the same order.
+    /// Moved controls inside the cage (.obj): the same vertices in the same order.
     #[arg(long, value_name = "FILE", requires = "controls")]
     pub(crate) pose_controls: Option<PathBuf>,
     /// Map points of the deformed space back to the space at rest.

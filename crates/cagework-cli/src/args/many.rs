@@ -35,7 +35,7 @@ pub(crate) struct RefitArgs {
     /// Moved cage: the same vertices in the same order.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose: PathBuf,
-    /// Moved inner controls (.obj): the same vertices in the same order [default: at rest].
+    /// Moved controls inside the cage (.obj): the same vertices in the same order [default: at rest].
     #[arg(long, value_name = "FILE", requires = "controls")]
     pub(crate) pose_controls: Option<PathBuf>,
     /// Body whose joints the models share: joints with the same name move as in this file, and files of clips without a mesh are

@@ -28,7 +28,7 @@ pub(crate) struct PoseArgs {
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
-    /// File for the pose of the inner controls (.obj).
+    /// File for the pose of the controls inside the cage (.obj).
     #[arg(long, value_name = "FILE", requires = "controls", value_parser = obj_output)]
     pub(crate) save_controls: Option<PathBuf>,
 }

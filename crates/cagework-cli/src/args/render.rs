@@ -40,7 +40,7 @@ pub(crate) struct RenderArgs {
     /// Moved cage that deforms the model.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) pose: Option<PathBuf>,
-    /// Moved inner controls (.obj).
+    /// Moved controls inside the cage (.obj).
     #[arg(long, value_name = "FILE", requires_all = ["pose", "controls"])]
     pub(crate) pose_controls: Option<PathBuf>,
     #[command(flatten)]

@@ -55,7 +55,7 @@ pub(super) fn stretches(mesh: &TriMesh, posed: &[Vec3]) -> Stretches {
 /// the grabs along the surface; `None` if no vertex is that far.
 pub(super) fn far_mean(drag: &Drag, before: &[Vec3], after: &[Vec3]) -> Option<f64> {
     let limit = FAR_REACH_RATIO * drag.reach_length();
-    let moves = drag.walks().iter().zip(before.iter().zip(after));
+    let moves = drag.distances().iter().zip(before.iter().zip(after));
     let far: Vec<f64> = moves
         .filter(|(walk, _)| f64::from(**walk) > limit)
         .map(|(_, (before, after))| before.as_dvec3().distance(after.as_dvec3()))

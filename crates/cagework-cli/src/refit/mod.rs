@@ -227,7 +227,7 @@ impl Binder<'_> {
         let has_moves = self.skeleton.as_ref().is_some_and(|skeleton| skeleton.has_moves());
         let load = if has_moves && format == ModelFormat::Gltf { load_with_clips } else { load_model };
         let mut model = load(path, args.read.axis(), args.read.memory)?;
-        model.see_from(self.origin);
+        model.set_origin(self.origin);
         if model.positions.is_empty() {
             return self.of_clips(job, model, started);
         }
@@ -296,7 +296,7 @@ impl Binder<'_> {
         let (up, memory) = (args.read.axis(), args.read.memory);
         if let Some(path) = &args.skeleton {
             let mut model = load_model(path, up, memory)?;
-            model.see_from(self.origin);
+            model.set_origin(self.origin);
             if !model.is_rigged() {
                 return Err(CliError::file(
                     path,

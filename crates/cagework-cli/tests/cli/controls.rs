@@ -49,7 +49,7 @@ fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
     assert_close(&obj_positions(&sandbox.read("rest.obj")), &rest, 1e-6);
 
     let deform = "deform mesh.obj --cage cage.obj --weights w.npz --pose cage.obj -o out.obj";
-    sandbox.run(deform).success().stdout(contains("by 8 cage vertices and 4 inner controls"));
+    sandbox.run(deform).success().stdout(contains("by 8 cage vertices and 4 controls inside"));
     assert_close(&obj_positions(&sandbox.read("out.obj")), &rest, 1e-6);
     sandbox.write("moved.obj", MOVED_SPINE);
     sandbox.run(&format!("{deform} --pose-controls moved.obj")).success();
@@ -72,7 +72,7 @@ fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
     sandbox
         .run(&format!("{deform} --pose-controls few.obj"))
         .failure()
-        .stderr(contains("has 1 vertex, but 4 inner controls were bound"));
+        .stderr(contains("has 1 vertex, but 4 controls inside were bound"));
     sandbox
         .run(&format!("{deform} --pose-controls moved.obj --pose-controls moved.obj"))
         .failure()
@@ -91,7 +91,7 @@ fn pull_moves_inner_controls() {
     let posed = obj_positions(&sandbox.read("posed.obj"));
     assert_eq!(posed.len(), 4);
     assert!((posed[3][2] - 0.7).abs() < 1e-2, "{:?}", posed[3]);
-    sandbox.run(pull).failure().stderr(contains("was bound with 4 inner controls, but 0 were given"));
+    sandbox.run(pull).failure().stderr(contains("was bound with 4 controls inside, but 0 were given"));
 }
 
 #[test]

@@ -110,11 +110,11 @@ pub(super) fn estimate(
             + transfers * (1.0 + COARSE_LEVELS_SHARE)
     };
     // V-cycles may stall if the cage has several parts. Conjugate gradients then take over and need five fields.
-    let of_rescue =
+    let of_fallback =
         if controls.surface().component_of_face().iter().any(|&part| part > 0) { 5.0 } else { 0.0 };
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
-        Solver::Multigrid => on_levels((1.5 + of_rescue) * n_unknowns + n_cut),
+        Solver::Multigrid => on_levels((1.5 + of_fallback) * n_unknowns + n_cut),
         // Five fields; the preconditioning V-cycle has another two and a half.
         Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
         Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),

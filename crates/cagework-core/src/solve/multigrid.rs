@@ -66,7 +66,7 @@ pub struct Workspace {
     /// Whether `f[0]` has one row per cell.
     is_finest_dense: bool,
     /// Conjugate gradients for stalled cycles, allocated on demand.
-    rescue: Option<Box<ConjugateGradient>>,
+    fallback: Option<Box<ConjugateGradient>>,
 }
 
 impl Workspace {
@@ -82,7 +82,7 @@ impl Workspace {
             f,
             residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
             is_finest_dense: false,
-            rescue: None,
+            fallback: None,
         }
     }
 
@@ -203,13 +203,13 @@ impl BatchSolver for Workspace {
                 self.up(hierarchy, 0, UP_PASSES);
             }
             if stalls {
-                let mut rescue =
-                    self.rescue.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, None)));
+                let mut fallback =
+                    self.fallback.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, None)));
                 let (rhs, mut u) = (std::mem::take(&mut self.f[0]), std::mem::take(&mut self.u[0]));
                 let so_far = (rule, convergence.into_report());
-                let report = rescue.resume(hierarchy, self, (&mut u, &rhs), so_far, cycle_done);
+                let report = fallback.resume(hierarchy, self, (&mut u, &rhs), so_far, cycle_done);
                 (self.f[0], self.u[0]) = (rhs, u);
-                self.rescue = Some(rescue);
+                self.fallback = Some(fallback);
                 return report;
             }
             if done {
@@ -229,7 +229,7 @@ impl BatchSolver for Workspace {
 
     fn bytes(&self) -> usize {
         let rows = self.u.iter().chain(&self.f).map(Vec::len).sum::<usize>() + self.residual.len();
-        rows * size_of::<Row>() + self.rescue.as_ref().map_or(0, |rescue| rescue.bytes())
+        rows * size_of::<Row>() + self.fallback.as_ref().map_or(0, |fallback| fallback.bytes())
     }
 }
 

@@ -1,6 +1,6 @@
-//! Picking, selecting and moving the vertices of a cage and its interior controls.
+//! Picking, selecting and moving the vertices of a cage and its inner controls.
 //!
-//! Functions take the positions of the controls (the cage's vertices, then the interior controls), `[n_controls]`,
+//! Functions take the positions of the controls (the cage's vertices, then the inner controls), `[n_controls]`,
 //! object units, and the faces of a [`cagework_core::Cage`]. Pixels are those of the
 //! [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
 

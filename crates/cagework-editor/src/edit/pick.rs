@@ -64,7 +64,7 @@ pub fn pick_vertex(
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    // Interior controls have no face and are drawn on top: nothing occludes them.
+    // Inner controls have no face and are drawn on top: nothing occludes them.
     let (of_faces, inside): (Vec<_>, Vec<_>) =
         near.partition(|near| topology.faces.iter().any(|face| face.contains(&near.0)));
     let inside = inside.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
@@ -82,7 +82,7 @@ pub fn pick_vertex(
 }
 
 /// Whether the model covers a vertex that [`pick_vertex`] has picked: its frontmost point under the pointer, `surface`, is
-/// in front of the vertex by more than twice the radius. Interior controls are drawn on top, so nothing covers them.
+/// in front of the vertex by more than twice the radius. Inner controls are drawn on top, so nothing covers them.
 #[must_use]
 pub fn is_covered(
     vertex: u32,
@@ -321,7 +321,7 @@ mod tests {
         };
         // Vertex 3 is at z = 0, and twice the radius is 0.1.
         assert!(covered(3, 0.5) && covered(3, 0.11) && !covered(3, 0.09) && !covered(3, -0.5));
-        assert!(!covered(8, 0.5), "an interior control at the same place");
+        assert!(!covered(8, 0.5), "an inner control at the same place");
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Creates an empty selection in a cage of `n_cage` controls: vertices and interior controls.
+    /// Creates an empty selection in a cage of `n_cage` controls: vertices and inner controls.
     #[must_use]
     pub fn new(n_cage: usize) -> Self {
         Self { selected: vec![false; n_cage], last: None }

@@ -17,7 +17,7 @@ fn model(name: &str, at: f32) -> Model {
     }
     text += "usemtl skin\nf 1 3 2\nusemtl cloth\nf 1 2 4\nf 2 3 4\n";
     let mut model = Model::read(name, text.as_bytes(), &mut |_| None).unwrap();
-    model.see_from(DVec3::ZERO);
+    model.set_origin(DVec3::ZERO);
     model
 }
 
@@ -78,7 +78,7 @@ fn models_in_one_cage_have_the_origin_of_the_first() {
     assert_eq!((models.origin(), models.origin_notice()), (DVec3::ZERO, None));
     for mut one in [at("a.obj", 4.5e6), at("b.obj", 4.6e6)] {
         if !models.is_empty() {
-            one.see_from(models.origin());
+            one.set_origin(models.origin());
         }
         models.add([(one, None)]);
     }

@@ -47,7 +47,7 @@ pub(crate) fn read(
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
     let mut n_splats = 0_u64;
     let (mut is_rigged, mut repeated) = (false, Vec::new());
-    let mut loose: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut unweighted: BTreeMap<u32, usize> = BTreeMap::new();
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -61,9 +61,9 @@ pub(crate) fn read(
             let start = geometry.positions.len();
             let (local, n_morphed) = positions(document, instance, primitive, position)?;
             morphed += n_morphed;
-            let (frame, n_loose) = Frame::of(document, instance, primitive, local.len())?;
-            if let Some(skin) = instance.skin.filter(|_| n_loose > 0) {
-                *loose.entry(skin).or_insert(0) += n_loose;
+            let (frame, n_unweighted) = Frame::of(document, instance, primitive, local.len())?;
+            if let Some(skin) = instance.skin.filter(|_| n_unweighted > 0) {
+                *unweighted.entry(skin).or_insert(0) += n_unweighted;
             }
             for (v, p) in local.iter().enumerate() {
                 let world = relative(frame.world(v).transform_point3(*p), origin);
@@ -102,7 +102,7 @@ pub(crate) fn read(
     if is_rigged {
         notices.push("rigged model: opened in its rest pose".to_owned());
     }
-    for (skin, n) in loose {
+    for (skin, n) in unweighted {
         notices.push(format!(
             "skin {skin} has no positive weight for {}: they follow the mesh's node",
             counted(n, "vertex", "vertices")
@@ -192,8 +192,9 @@ impl Frame {
     ) -> Result<(Self, usize), GltfError> {
         let Some(skin) = instance.skin else { return Ok((Self::Rigid(instance.world), 0)) };
         let joints = (skin, document.joints[skin as usize].as_slice());
-        let (all, n_loose) = skin::matrices(document.source(), joints, instance.world, primitive, count)?;
-        Ok((Self::Skinned(all), n_loose))
+        let (all, n_unweighted) =
+            skin::matrices(document.source(), joints, instance.world, primitive, count)?;
+        Ok((Self::Skinned(all), n_unweighted))
     }
 
     pub(super) fn world(&self, v: usize) -> DMat4 {

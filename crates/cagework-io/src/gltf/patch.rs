@@ -96,7 +96,15 @@ pub(crate) fn patch(
         }
     }
     for (number, place) in places.iter().enumerate() {
-        patch_loose(document, number as u32, place, rest.origin, poses.len(), &mut json, &mut pack)?;
+        patch_points_and_lines(
+            document,
+            number as u32,
+            place,
+            rest.origin,
+            poses.len(),
+            &mut json,
+            &mut pack,
+        )?;
     }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
@@ -107,7 +115,7 @@ pub(crate) fn patch(
 
 /// Patches the points and lines of an instance, which are not deformed. They lose their skin and morph targets, stay in
 /// their rest pose, and get one empty target per pose, because all primitives of a mesh have equally many targets.
-fn patch_loose(
+fn patch_points_and_lines(
     document: &GltfDocument,
     instance: u32,
     place: &MeshPlacement,

@@ -31,6 +31,8 @@ const MAX_DECODED_VALUES: u64 = 1 << 28;
 /// Limit on the implicit zeros of all attributes and morph targets, summed over all nodes; or [`ZEROS_PER_BYTE`] per byte
 /// of the document, if that is more. Each zero takes up to 100 bytes in an export.
 const MAX_ZEROS: u64 = 1 << 21;
+
+/// Number of implicit zeros that are allowed per byte of the document.
 const ZEROS_PER_BYTE: u64 = 8;
 
 /// Limit on the values of all channels of clips; or one per byte of the document, if that is more. An export with this
@@ -40,16 +42,22 @@ const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 /// Limit on the joints of all skins. A joint takes up to 0.7 KB in an export, and skins can share their joints.
 const MAX_JOINTS: u64 = 1 << 18;
 
-/// Limits on clips and on the channels of all clips. The page takes about 10 s of processor time for this many.
+/// Limit on clips.
 const MAX_CLIPS: u64 = 1 << 12;
+
+/// Limit on the channels of all clips. The page takes about 10 s of processor time for this many clips and channels.
 const MAX_CHANNELS: u64 = 1 << 17;
 
 /// Bytes of JSON per primitive that the estimate of the memory for writing a model already includes.
 const PRIMITIVE_JSON_BYTES: u64 = 6000;
 
-/// Memory of a model, bytes: per vertex, per triangle, and per primitive of a node.
+/// Memory of a vertex, bytes.
 const VERTEX_BYTES: u64 = 12;
+
+/// Memory of a triangle, bytes.
 const TRIANGLE_BYTES: u64 = 12;
+
+/// Memory of a primitive of a node, bytes.
 const PRIMITIVE_BYTES: u64 = 300;
 
 /// Additional memory per vertex while reading: local and world position, and entry in the weld table, bytes.

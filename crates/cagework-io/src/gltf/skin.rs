@@ -116,6 +116,6 @@ pub(crate) fn matrices(
         get(joints, joint as usize, "joint", || format!("a vertex of skin {skin}"))?;
     }
     // Divide by the sum of the weights, which quantisation may have changed from 1.
-    let n_loose = sum.iter().filter(|(_, w)| *w <= 0.0).count();
-    Ok((sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect(), n_loose))
+    let n_unweighted = sum.iter().filter(|(_, w)| *w <= 0.0).count();
+    Ok((sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect(), n_unweighted))
 }

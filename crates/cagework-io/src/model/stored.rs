@@ -126,7 +126,8 @@ impl StoredArrays<'_> {
 
     /// Takes the next array as numbers.
     ///
-    /// # Errors [`RestoreError::Damaged`] if there are no more arrays.
+    /// # Errors
+    /// [`RestoreError::Damaged`] if there are no more arrays.
     pub fn numbers<T: Pod>(&mut self) -> Result<Vec<T>, RestoreError> {
         let bytes = self.bytes()?;
         let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
@@ -137,7 +138,8 @@ impl StoredArrays<'_> {
 
     /// Takes the next array as JSON.
     ///
-    /// # Errors [`RestoreError::Damaged`] if there are no more arrays, or it is not the JSON of a `T`.
+    /// # Errors
+    /// [`RestoreError::Damaged`] if there are no more arrays, or it is not the JSON of a `T`.
     pub fn json<T: DeserializeOwned>(&mut self) -> Result<T, RestoreError> {
         serde_json::from_slice(&self.bytes()?).map_err(|_| RestoreError::Damaged)
     }
@@ -195,7 +197,7 @@ impl Model {
         if matches!(head.document, HeadDocument::Capture) {
             let file = from.bytes()?;
             let mut model = Self::read(&head.name, &file, &mut |_| None)?;
-            model.see_from(origin);
+            model.set_origin(origin);
             model.set_up(head.up);
             model.notices = head.notices;
             return Ok(model);

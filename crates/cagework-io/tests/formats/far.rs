@@ -97,7 +97,7 @@ fn text_files_far_from_the_origin_are_read_and_written_without_loss() {
         }
         // Relative to the world origin, positions are rounded and a notice gives the step.
         let mut rounded = read_near("x", text.as_bytes());
-        rounded.see_from(DVec3::ZERO);
+        rounded.set_origin(DVec3::ZERO);
         assert_eq!(
             rounded.notices,
             ["the model is so far from the origin that its coordinates have steps of 5e-1: move it nearer"]
@@ -121,7 +121,7 @@ fn positions_can_be_relative_to_another_models_origin() {
     );
     assert!(cage.origin() != model.origin());
     let before: Vec<DVec3> = cage.positions.iter().map(|p| cage.origin() + p.as_dvec3()).collect();
-    cage.see_from(model.origin());
+    cage.set_origin(model.origin());
     let after: Vec<DVec3> = cage.positions.iter().map(|p| model.origin() + p.as_dvec3()).collect();
     assert_near(&after, &before, TOLERANCE);
     // Models near the world origin stay unchanged.
@@ -138,7 +138,7 @@ fn positions_of_a_node_far_away_are_kept() {
     let written = model.write_glb(&model.positions).unwrap();
     assert_eq!(json_of(&written)["nodes"][0], b.json["nodes"][0]);
     let mut local = read("y.glb", &written).unwrap();
-    local.see_from(PLACE.as_vec3().as_dvec3());
+    local.set_origin(PLACE.as_vec3().as_dvec3());
     assert_near(&places(&read_near("y.glb", &written)), &places(&model), TOLERANCE);
     let accessor = &json_of(&written)["accessors"]
         [json_of(&written)["meshes"][0]["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap()

@@ -102,7 +102,7 @@ fn projects_far_from_the_origin_keep_their_origin() {
     let cube = read("x.glb", &b.glb()).unwrap();
     let text = String::from_utf8(write_cage_obj(&cube.cage_mesh(), cube.origin())).unwrap();
     for mut model in [cube.clone(), read("x.obj", text.as_bytes()).unwrap()] {
-        model.see_from(cube.origin());
+        model.set_origin(cube.origin());
         let cage = cage(&model);
         let bytes = write_project(&[&model, &cube], &cage, &poses(&cage), SETTINGS).unwrap();
         let project = reopened(&bytes);

@@ -107,7 +107,7 @@ pub struct Drag {
     /// Current moments: `posed` and a share of `relaxing`.
     pub(super) moments: Vec<f64>,
     /// Distance along the surface to the nearest grab, object units. `[n_vertices]`
-    walks: Vec<f32>,
+    distances: Vec<f32>,
     /// Whether the drag has a single grab, on the model, no pins and an unlimited reach, so that it only translates the
     /// model.
     pub(super) is_shift: bool,
@@ -139,20 +139,20 @@ impl Drag {
         let targets = &handles * &cage;
 
         let seeds: Vec<u32> = grips.iter().map(|grip| grip.seed).collect();
-        let walks: Vec<Vec<f32>> =
+        let distances: Vec<Vec<f32>> =
             seeds[..grabs.len()].iter().map(|&s| pull.geodesic.from(s, f32::INFINITY)).collect();
-        let reach = reach_of(pull, options.reach, &walks, &seeds[..grabs.len()]);
+        let reach = reach_of(pull, options.reach, &distances, &seeds[..grabs.len()]);
         let samples = &pull.probes.samples;
-        let walks: Vec<f32> = (0..pull.n_vertices)
-            .map(|v| walks.iter().map(|walk| walk[v]).fold(f32::INFINITY, f32::min))
+        let distances: Vec<f32> = (0..pull.n_vertices)
+            .map(|v| distances.iter().map(|from_grab| from_grab[v]).fold(f32::INFINITY, f32::min))
             .collect();
-        let stays: Vec<f64> = samples.iter().map(|&s| stays(walks[s as usize], reach)).collect();
+        let stays: Vec<f64> = samples.iter().map(|&s| stays(distances[s as usize], reach)).collect();
         let mut holds: Vec<f64> = stays.iter().map(|stay| STAY_WEIGHT * stay).collect();
         let patch = PIN_RADIUS * pull.size;
         for &seed in &seeds[grabs.len()..] {
-            let walk = pull.geodesic.from(seed, patch as f32);
+            let from_pin = pull.geodesic.from(seed, patch as f32);
             for (hold, &s) in holds.iter_mut().zip(samples) {
-                *hold += PIN_WEIGHT * (1.0 - smooth(f64::from(walk[s as usize]) / patch));
+                *hold += PIN_WEIGHT * (1.0 - smooth(f64::from(from_pin[s as usize]) / patch));
             }
         }
         let mut held = pull.sample_rows.clone();
@@ -219,7 +219,7 @@ impl Drag {
             moments: posed.clone(),
             posed,
             relaxing,
-            walks,
+            distances,
             is_shift: reach.is_infinite() && grips.len() == 1 && !cage_grabbed,
             anderson: Anderson::default(),
             moved: 0.0,
@@ -247,14 +247,14 @@ impl Drag {
 
     /// Distance of each vertex from the nearest grab along the surface, object units. `[n_vertices]`
     #[must_use]
-    pub fn walks(&self) -> &[f32] {
-        &self.walks
+    pub fn distances(&self) -> &[f32] {
+        &self.distances
     }
 
     /// Weight with which a vertex of the model stays in place: 0 up to 75 % of the reach, 1 from the reach on.
     #[must_use]
     pub fn stays(&self, vertex: u32) -> f64 {
-        stays(self.walks[vertex as usize], self.reach)
+        stays(self.distances[vertex as usize], self.reach)
     }
 
     /// Cage positions. `[n]`, object units
@@ -335,36 +335,37 @@ pub const REACH: Number = Number {
 
 /// Computes the reach in object units. Automatic: the distance that encloses 15 % of the area (30 % with two or more
 /// grabs), limited to [`REACH_RANGE`], but at least 1.2 times the largest distance between two grabs.
-fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64 {
+fn reach_of(pull: &Pull, reach: Reach, distances: &[Vec<f32>], seeds: &[u32]) -> f64 {
     match reach {
         Reach::Whole => return f64::INFINITY,
         Reach::Of(share) => return share * pull.size,
         Reach::Automatic => {}
     }
-    let wanted = REACH_AREA * walks.len().min(2) as f64;
-    let holding = |walk: &Vec<f32>| {
-        let mut order: Vec<u32> = (0..walk.len() as u32).collect();
-        order.sort_unstable_by(|&a, &b| walk[a as usize].total_cmp(&walk[b as usize]));
+    let wanted = REACH_AREA * distances.len().min(2) as f64;
+    let holding = |from_grab: &Vec<f32>| {
+        let mut order: Vec<u32> = (0..from_grab.len() as u32).collect();
+        order.sort_unstable_by(|&a, &b| from_grab[a as usize].total_cmp(&from_grab[b as usize]));
         let mut area = 0.0;
         let last = order.iter().find(|&&v| {
             area += pull.probes.areas[v as usize];
             area >= wanted
         });
-        last.or(order.last()).map_or(0.0, |&v| f64::from(walk[v as usize]))
+        last.or(order.last()).map_or(0.0, |&v| f64::from(from_grab[v as usize]))
     };
     let [least, most] = REACH_RANGE.map(|share| share * pull.size);
-    let reach = walks.iter().map(holding).fold(0.0, f64::max).clamp(least, most);
-    let between = walks.iter().flat_map(|walk| seeds.iter().map(|&s| f64::from(walk[s as usize])));
+    let reach = distances.iter().map(holding).fold(0.0, f64::max).clamp(least, most);
+    let between =
+        distances.iter().flat_map(|from_grab| seeds.iter().map(|&s| f64::from(from_grab[s as usize])));
     reach.max(REACH_PER_GRAB_DISTANCE * between.fold(0.0, f64::max))
 }
 
 /// Weight with which a point stays in place, given its distance from the grabs: 0 up to `FREE_SHARE` of the reach, 1
 /// from the reach on, smooth in between.
-fn stays(walk: f32, reach: f64) -> f64 {
+fn stays(distance: f32, reach: f64) -> f64 {
     if reach.is_infinite() {
         0.0
     } else {
-        smooth((f64::from(walk) / reach - FREE_SHARE) / (1.0 - FREE_SHARE))
+        smooth((f64::from(distance) / reach - FREE_SHARE) / (1.0 - FREE_SHARE))
     }
 }
 

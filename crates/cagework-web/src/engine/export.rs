@@ -93,7 +93,7 @@ impl Engine {
             let id = body.ok_or_else(|| Fault::missing("skeleton", "open a model that has one"))?.id;
             let moved = MovedModel::new(state, id)?;
             clips.set_up(state.up());
-            clips.see_from(state.models().origin());
+            clips.set_origin(state.models().origin());
             Answer::Ok(moved.model.skeleton(&moved.by(state, &pose)?, &moved.outside, &options)?)
         })?;
         let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
@@ -348,7 +348,7 @@ impl Engine {
         self.read(|state| {
             let member = state.models().get(id)?;
             let mut posed = member.share(&state.deformed(&pose)?).to_vec();
-            member.model.stand(&mut posed, &options);
+            member.model.lift(&mut posed, &options);
             Ok((member.model.write_glb(&posed)?, Vec::new()))
         })
     }

@@ -106,7 +106,7 @@ impl Engine {
         for (k, loaded) in models.iter_mut().enumerate() {
             if k > 0 {
                 loaded.turn_to(up);
-                loaded.model.see_from(origin);
+                loaded.model.set_origin(origin);
             }
             draws.push(Arc::new(loaded.draw_model()));
             page_turn().await;

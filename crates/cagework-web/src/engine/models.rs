@@ -40,7 +40,7 @@ impl Engine {
         let (mut added, mut draws) = (Vec::new(), Vec::new());
         for mut loaded in models {
             loaded.turn_to(up);
-            loaded.model.see_from(origin);
+            loaded.model.set_origin(origin);
             draws.push(Arc::new(loaded.draw_model()));
             let settings = loaded.member_settings();
             added.push((loaded.model, settings));

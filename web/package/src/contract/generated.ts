@@ -9,7 +9,8 @@ export type Backend = "cpu" | "gpu";
  */
 export type BindOptions = { backend: Backend,
 /**
- * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
+ * Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
+ * Default 64.
  */
 grid: number,
 /**
@@ -219,7 +220,7 @@ positions: Float32Array,
  */
 corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
 /**
- * Subdivision and interior controls of a cage.
+ * Subdivision and inner controls of a cage.
  */
 export type CageControls = {
 /**
@@ -227,11 +228,11 @@ export type CageControls = {
  */
 smooth: number,
 /**
- * Number of interior controls, which are the last of the cage's positions.
+ * Number of inner controls, which are the last of the cage's positions.
  */
 inner: number,
 /**
- * Points, lines and faces; indices are relative to the first interior control.
+ * Points, lines and faces; indices are relative to the first inner control.
  */
 elements: Array<InnerElement>,
 /**
@@ -357,7 +358,7 @@ export type Colour = "material" | "clay" | "weight" | "error";
  */
 export type Command = { "do": "set_pose",
 /**
- * Positions of cage vertices, then of interior controls, object units. `[n_controls]`
+ * Positions of cage vertices, then of inner controls, object units. `[n_controls]`
  */
 positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
 /**
@@ -445,11 +446,11 @@ shares: Array<number>, } | { "do": "set_pins",
  */
 pins: Array<SurfacePoint>, } | { "do": "replace_cage",
 /**
- * Positions of the vertices of the new cage, then of its interior controls, and the cage's faces.
+ * Positions of the vertices of the new cage, then of its inner controls, and the cage's faces.
  */
 mesh: unknown,
 /**
- * Subdivision and interior controls; null keeps the current ones if they fit.
+ * Subdivision and inner controls; null keeps the current ones if they fit.
  */
 controls: CageControls | null,
 /**
@@ -611,7 +612,7 @@ export type GizmoPart = { "axis": number } | { "plane": number } | "view";
  */
 export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
 /**
- * A kind of interior control.
+ * A kind of inner control.
  */
 export type InnerKind = "point" | "line" | "face";
 /**
@@ -1189,7 +1190,7 @@ editingRest: boolean,
  */
 sample: string | null,
 /**
- * Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
+ * Whether the cage is the built-in one of `sample`; smoothing and inner controls may differ.
  */
 sampleCage: boolean,
 /**

@@ -28,14 +28,15 @@ use crate::gltf::{self, GltfDocument};
 const MAX_SPEED: f64 = 0.3;
 /// Largest height of a planted ankle above its lowest height in the clip, leg lengths.
 const MAX_HEIGHT: f64 = 0.06;
-/// Shortest contact, and longest gap across which two contacts are joined, seconds.
+/// Shortest contact, seconds.
 const MIN_CONTACT: f64 = 0.08;
+/// Longest gap across which two contacts are joined, seconds.
 const MAX_GAP: f64 = 0.04;
 /// Time in which a correction fades before and after a contact, seconds.
 const FADE: f64 = 0.15;
-/// Samples per second at equal time steps, in addition to samples at the keys of the clip. A clip has at most
-/// [`MAX_SAMPLES`] samples of each kind.
+/// Samples per second at equal time steps, in addition to samples at the keys of the clip.
 const RATE: f64 = 60.0;
+/// Largest number of samples of a clip at equal time steps, and at keys.
 const MAX_SAMPLES: usize = 20_000;
 /// Largest number of legs whose feet are locked.
 const MAX_LEGS: usize = 32;

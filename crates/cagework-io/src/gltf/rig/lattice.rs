@@ -16,9 +16,11 @@ use super::{Rig, RigPrimitive, Target};
 /// these ends take about 0.16 GB: eight bytes per weight.
 pub(super) const MAX_ENDS: usize = 200_000;
 
-/// Limits on the number of nodes of a lattice, and on its cells along the model's longest side. Finer cells than those
-/// of the solver's grid add no accuracy.
+/// Limit on the number of nodes of a lattice.
 const MAX_NODES: usize = 60_000;
+
+/// Limit on the cells of a lattice along the model's longest side. Finer cells than those of the solver's grid add no
+/// accuracy.
 const MAX_CELLS_PER_SIDE: f64 = 256.0;
 
 /// Number of bits of a cell's coordinate along one axis.

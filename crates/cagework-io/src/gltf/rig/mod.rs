@@ -15,6 +15,7 @@ mod expressions;
 mod feet;
 mod ground;
 mod lattice;
+mod lift;
 mod nodes;
 mod overlap;
 mod play;
@@ -23,7 +24,6 @@ mod report;
 mod reshape;
 mod shape;
 mod skeleton;
-mod stand;
 mod surface;
 mod tracks;
 mod vrm;
@@ -138,8 +138,9 @@ impl RigPrimitive {
 impl<'a> Rig<'a> {
     /// Reads the rig of a document. `rest`: vertices of the model, relative to `origin`.
     ///
-    /// # Errors If a primitive cannot be read. Primitives of visible meshes are readable, because they were validated
-    /// when the file was read.
+    /// # Errors
+    /// If a primitive cannot be read. Primitives of visible meshes are readable, because they were validated when the
+    /// file was read.
     pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3], origin: DVec3) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut rig = Self {

@@ -52,7 +52,7 @@ pub(super) struct NodeUpdate {
     /// Number of joints outside the cage that carry vertices.
     pub(super) n_outside: usize,
     /// Number of joints outside the cage that carry no vertices. These joints follow their parent.
-    pub(super) n_loose: usize,
+    pub(super) n_follow_parent: usize,
 }
 
 /// How a node moves, in world space.
@@ -209,7 +209,7 @@ impl Rig<'_> {
             moves: vec![still; n],
             n_moved: 0,
             n_outside: 0,
-            n_loose: 0,
+            n_follow_parent: 0,
         };
         let stays = given.joints == Joints::Stay;
         if stays && given.rigid.is_empty() {
@@ -253,18 +253,21 @@ impl Rig<'_> {
                 }
                 (None, Some(at)) => {
                     let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
-                    let is_loose = given.is_outside[at] && !holds;
+                    let follows_parent = given.is_outside[at] && !holds;
                     moved.n_outside += usize::from(given.is_outside[at] && holds);
-                    moved.n_loose += usize::from(is_loose);
-                    movable[i] |= !is_loose;
+                    moved.n_follow_parent += usize::from(follows_parent);
+                    movable[i] |= !follows_parent;
                     // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a
                     // chain, follow their parent.
-                    let by =
-                        if is_loose { parent.map_or(DVec3::ZERO, |p| moves[p].by) } else { given.by[at] };
+                    let by = if follows_parent {
+                        parent.map_or(DVec3::ZERO, |p| moves[p].by)
+                    } else {
+                        given.by[at]
+                    };
                     (by, turn(at))
                 }
                 (None, None) => {
-                    moved.n_loose += usize::from(follows(i));
+                    moved.n_follow_parent += usize::from(follows(i));
                     if let Some(parent) = parent.filter(|&p| new[p] != old[p]) {
                         new[i] = new[parent] * local(&root.nodes[i]);
                         moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();

@@ -16,7 +16,7 @@ pub struct ReshapeReport {
     /// Number of joints outside the cage that carry vertices. They move like vertices outside the cage.
     pub joints_outside: usize,
     /// Number of joints outside the cage that carry no vertices. They follow their parent.
-    pub joints_loose: usize,
+    pub joints_following_parent: usize,
     /// Number of ends of morph targets. An end is a vertex with one target at weight 0 or 1.
     pub morph_ends: usize,
     /// Number of ends of morph targets outside the cage. They move like vertices outside the cage.

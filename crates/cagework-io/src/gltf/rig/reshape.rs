@@ -16,7 +16,7 @@ use super::poses::PoseDisplacements;
 use super::report::ReshapeReport;
 use super::shape::{Shape, SurfaceGradients};
 use super::skeleton::Skeleton;
-use super::{Rig, RigPrimitive, expressions, feet, key_of, poses, stand, tracks, vrm};
+use super::{Rig, RigPrimitive, expressions, feet, key_of, lift, poses, tracks, vrm};
 use crate::error::WriteError;
 use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
@@ -120,7 +120,7 @@ pub(crate) fn reshape(
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
-        report.joints_loose = moved.n_loose;
+        report.joints_following_parent = moved.n_follow_parent;
         let binds = write_binds(rig, &mut edit, &moved.world);
         let turned = SurfaceGradients::new(triangles, by);
         for part in &rig.parts {
@@ -161,9 +161,9 @@ pub(crate) fn reshape(
     report.lift = lift.dot(up);
     report.ground = own;
     if options.ground && has_moved && options.joints != Joints::Stay {
-        let lows = stand::StandInput { named: named.as_ref(), shared, lift: report.lift, up };
-        let (stood, clips) = stand::stand(rig, glb, &lows)?;
-        glb = stood;
+        let lows = lift::LiftInput { named: named.as_ref(), shared, lift: report.lift, up };
+        let (lifted, clips) = lift::lift_clips(rig, glb, &lows)?;
+        glb = lifted;
         report.clip_lifts = clips.iter().map(|clip| clip.lift).collect();
         report.ground = report.ground.map(|ground| ground.with(clips));
     }

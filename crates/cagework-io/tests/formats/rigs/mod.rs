@@ -76,7 +76,7 @@ fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
     let place = vec3(500_000.25, 0.0, 4_500_000.5);
     let at_place = |bytes: &[u8]| {
         let mut model = read(bytes);
-        model.see_from(place.as_dvec3());
+        model.set_origin(place.as_dvec3());
         model
     };
     let mut b = rigged();

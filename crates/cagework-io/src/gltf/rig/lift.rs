@@ -33,8 +33,8 @@ const MAX_SAMPLES: usize = 40_000;
 /// before and after the deformation.
 const DIRECTIONS: usize = 128;
 
-/// Input of [`stand`].
-pub(super) struct StandInput<'a> {
+/// Input of [`lift_clips`].
+pub(super) struct LiftInput<'a> {
     /// Moves of joints by their names.
     pub(super) named: Option<&'a NamedMoves>,
     /// Heights of a shared skeleton, which replace the heights of the file.
@@ -58,10 +58,10 @@ enum Points {
 ///
 /// # Errors
 /// [`WriteError`] if the GLB cannot be read again.
-pub(super) fn stand(
+pub(super) fn lift_clips(
     rig: &Rig<'_>,
     glb: Vec<u8>,
-    given: &StandInput<'_>,
+    given: &LiftInput<'_>,
 ) -> Result<(Vec<u8>, Vec<ClipGround>), WriteError> {
     let before = rig.document;
     let after = gltf::read("export.glb", &glb, &mut |_| None, u64::MAX, (Some(DVec3::ZERO), true))?.document;
