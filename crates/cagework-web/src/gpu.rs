@@ -81,7 +81,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 gpu.main.adopt(weights, frames).await?;
                 let mut state = state.borrow_mut();
                 if state.editor.key() == key {
-                    state.set_bound(bound, gpu.main.bound_parts());
+                    state.set_bound(bound);
                 }
             }
             Upload::Parts => {
@@ -90,9 +90,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 for session in std::iter::once(main).chain(others.iter_mut().map(|(_, session)| session)) {
                     session.set_parts(parts.clone()).await?;
                 }
-                let mut state = state.borrow_mut();
-                state.on_gpu.parts = Some(models_key);
-                state.set_parts(gpu.main.bound_parts());
+                state.borrow_mut().on_gpu.parts = Some(models_key);
             }
         }
         let mut state = state.borrow_mut();

@@ -44,7 +44,7 @@ pub(crate) struct State {
     pub(crate) bound: Option<Arc<BoundModels>>,
     /// Parts of the models that stay in place or are rigid, prepared for the current weights. `None` if all vertices
     /// follow the cage.
-    parts: Option<Arc<BoundParts>>,
+    parts: Option<BoundParts>,
     /// Cached weights for documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,
     /// Notices from the last export: changes of the rig, and data that the file format loses.
@@ -200,7 +200,7 @@ impl State {
             self.fit_camera();
         }
         if models != models_before {
-            self.held.posed_for.clear();
+            self.prepare_parts();
             self.show_painting();
             self.is_changed = true;
         }
@@ -322,19 +322,22 @@ impl State {
         }
     }
 
-    /// Uses `bound` as the weights of the current document, with the parts that are prepared for them, and ends the
-    /// playback of a clip.
-    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>, parts: Option<Arc<BoundParts>>) {
+    /// Uses `bound` as the weights of the current document, and ends the playback of a clip.
+    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
         self.bound = Some(bound);
         self.playing = None;
-        self.set_parts(parts);
+        self.prepare_parts();
         (self.is_moved, self.is_changed) = (true, true);
     }
 
-    /// Sets the parts of the models that stay in place or are rigid.
-    pub(crate) fn set_parts(&mut self, parts: Option<Arc<BoundParts>>) {
-        self.parts = parts;
+    /// Prepares the parts of the models that stay in place or are rigid for the current weights.
+    fn prepare_parts(&mut self) {
         self.held.posed_for.clear();
+        let models = self.models();
+        self.parts = self.bound.as_ref().and_then(|bound| {
+            let (weights, frames) = (&bound.weights, &bound.frames);
+            models.parts().bound(models.positions(), weights, frames, &self.rest().positions)
+        });
     }
 
     /// The weights of the current models and cage.
@@ -526,7 +529,6 @@ mod tests {
     use cagework_editor::edit::Element;
     use cagework_editor::{Command, Contents, Tools};
     use cagework_io::Model;
-    use cagework_pose::parts::Parts;
 
     use super::*;
     use crate::held::Grab;
@@ -561,7 +563,7 @@ mod tests {
                 Upload::Cage => state.on_gpu.cage = Some(key.cage),
                 Upload::Weights => {
                     let bound = Arc::clone(state.cache.get(key).unwrap());
-                    state.set_bound(bound, None);
+                    state.set_bound(bound);
                 }
                 Upload::Parts => state.on_gpu.parts = Some(models),
             }
@@ -589,7 +591,7 @@ mod tests {
     fn bind(state: &mut State) {
         let bound = bound_by(Weights::with_room(8, 0, 0), Frames::default());
         state.cache.insert(state.editor.key(), Arc::clone(&bound), 100);
-        state.set_bound(bound, None);
+        state.set_bound(bound);
     }
 
     #[test]
@@ -706,7 +708,7 @@ mod tests {
         let bary = corners.map(|v| f32::from(u8::from(v == 1)));
         state.held.points = vec![SurfacePoint { triangle: state.models().number_of(0), bary }];
         assert!(state.held_marks().points.is_empty(), "before a bind");
-        state.set_bound(bound_by(rows.unwrap(), frames), None);
+        state.set_bound(bound_by(rows.unwrap(), frames));
         assert_eq!(state.held_marks().points, [at + Vec3::new(0.5, 0.0, 0.0)]);
     }
 
@@ -718,13 +720,18 @@ mod tests {
         let pose: Vec<Vec3> = state.pose().iter().map(|p| *p + Vec3::X).collect();
         assert_eq!(state.deformed(&pose).unwrap(), rest, "before a bind");
         let weights = Weights::new(8, (0..=4).collect(), (0..4).collect(), vec![1.0; 4]).unwrap();
-        let parts = Parts { stays: vec![0.0, 1.0, 0.0, 0.0], ..Parts::default() };
-        let held = BoundParts::new(&parts, &rest, &weights, &Frames::default(), &state.rest().positions);
-        state.set_bound(bound_by(weights, Frames::default()), Some(Arc::new(held)));
+        state.set_bound(bound_by(weights, Frames::default()));
+        let id = state.models().iter().next().unwrap().id;
+        state.editor.paint(id, |painted| *painted = vec![0, 255, 0, 0]);
+        state.editor.commit("Paint");
+        state.follow_document();
         let moved = state.deformed(&pose).unwrap();
         assert_eq!(moved, [pose[0], rest[1], pose[2], pose[3]]);
         assert_eq!(state.deformed(&state.rest().positions).unwrap(), rest);
         assert!(state.deformed(&pose[1..]).is_err());
+        state.editor.undo();
+        state.follow_document();
+        assert_eq!(state.deformed(&pose).unwrap(), pose[..4], "at once, before the GPU has the change");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::Controls;
 use cagework_core::deform::deform_bound;
-use cagework_pose::parts::{BoundParts, Parts};
+use cagework_pose::parts::Parts;
 use glam::Vec3;
 
 use super::Session;
@@ -34,12 +34,9 @@ impl Session {
         let (Some(bound), Some(model), Some(set)) = (&self.bound, &self.model, &self.controls) else {
             return Ok(());
         };
-        let is_nothing = self.parts.rigid.is_empty() && self.parts.stays.iter().all(|&s| s == 0.0);
         let columns = self.columns(bound.kind, &self.pose).into_owned();
-        let ready = (!is_nothing).then(|| {
-            let at_rest = self.columns(bound.kind, Controls::from(set).rest());
-            Arc::new(BoundParts::new(&self.parts, &model.positions, &bound.weights, &bound.frames, &at_rest))
-        });
+        let at_rest = self.columns(bound.kind, Controls::from(set).rest());
+        let ready = self.parts.bound(&model.positions, &bound.weights, &bound.frames, &at_rest).map(Arc::new);
         if let Some(bound) = &mut self.bound {
             bound.mover.hold(&self.context, model, ready.clone()).await?;
             bound.mover.pose(&self.context, &columns);
@@ -62,12 +59,5 @@ impl Session {
             parts.hold(&columns, &mut positions);
         }
         Some(positions)
-    }
-
-    /// Parts that stay in place or are rigid, prepared for the current weights. `None` without weights, or if all
-    /// vertices follow the cage.
-    #[must_use]
-    pub fn bound_parts(&self) -> Option<Arc<BoundParts>> {
-        self.bound.as_ref()?.parts.clone()
     }
 }

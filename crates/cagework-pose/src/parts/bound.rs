@@ -25,6 +25,22 @@ pub struct BoundParts {
     frames: Frames,
 }
 
+impl Parts {
+    /// Prepares the parts for a bind; `None` if all vertices follow the cage. Arguments and panics as
+    /// [`BoundParts::new`].
+    #[must_use]
+    pub fn bound(
+        &self,
+        rest: &[Vec3],
+        weights: &Weights,
+        frames: &Frames,
+        controls: &[Vec3],
+    ) -> Option<BoundParts> {
+        let is_nothing = self.rigid.is_empty() && self.stays.iter().all(|&s| s == 0.0);
+        (!is_nothing).then(|| BoundParts::new(self, rest, weights, frames, controls))
+    }
+}
+
 /// Displacement field of a rigid piece: a vertex at `x` moves by `rows * (x, 1)`.
 pub type PieceMotion = [Vec4; 3];
 

@@ -192,7 +192,7 @@ impl Engine {
             if is_final {
                 state.cache.insert(key, Arc::clone(&bound), bytes);
             }
-            state.set_bound(bound, gpu.main.bound_parts());
+            state.set_bound(bound);
         });
         Ok(())
     }
