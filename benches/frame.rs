@@ -11,7 +11,7 @@ use cagework_cage::samples;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::NoProgress;
 use cagework_core::skin::Skin;
-use cagework_core::{Cage, TriMesh, bind};
+use cagework_core::{Cage, Frames, TriMesh, bind};
 use cagework_gpu::render::DrawModel;
 use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuWeights, Session};
 use cagework_io::{Model, write_mesh_glb};
@@ -71,7 +71,8 @@ fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindO
     let rest: Vec<DVec3> = cage.positions().iter().map(|p| p.as_dvec3()).collect();
     let grab = || {
         let began = Instant::now();
-        let drag = Drag::new(&pull, &rest, slice::from_ref(&grip), &[], DragOptions::default());
+        let drag =
+            Drag::new(&pull, &rest, slice::from_ref(&grip), &[], &Frames::default(), DragOptions::default());
         (drag.expect("it can be held"), began.elapsed().as_secs_f64() * 1e3)
     };
     println!("pull, {} cage vertices: once {once:.1} ms", cage.n_vertices());

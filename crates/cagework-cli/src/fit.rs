@@ -4,10 +4,11 @@ mod landmarks;
 
 use std::time::Instant;
 
+use cagework_core::deform::deform_bound;
 use cagework_core::{Bounds, Weights};
 use cagework_io::{Model, shown};
 use cagework_pose::pull::FitOptions;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::FitArgs;
@@ -47,7 +48,7 @@ struct FitSummary {
 
 /// Points of the model with their target positions.
 struct Goals {
-    /// Weights of the points. `[n_points, n_controls]`
+    /// Weights of the points. `[n_points, n_columns]`
     weights: Weights,
     /// Weight of each point in the sum of squared distances. `[n_points]`
     importance: Vec<f64>,
@@ -79,7 +80,9 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     };
     let begun = Instant::now();
     let options = FitOptions { lambda: given.lambda };
-    let fitted = pull.fit(&weights, &importance, &to, options).map_err(|e| CliError::file(&args.mesh, e))?;
+    let fitted = pull
+        .fit(&weights, &bound.frames, &importance, &to, options)
+        .map_err(|e| CliError::file(&args.mesh, e))?;
     let fit_ms = begun.elapsed().as_secs_f64() * 1e3;
     let pose: Vec<Vec3> = fitted.cage.iter().map(|p| p.as_vec3()).collect();
     if let Some(i) = pose.iter().position(|p| !p.is_finite()) {
@@ -91,8 +94,8 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     write_pose(&bound.model, &bound.cage, &pose, args)?;
 
     let size = Bounds::of(&bound.model.positions).map_or(1.0, |b| f64::from(b.diagonal()));
-    let (rms_before, largest_before) =
-        distances(&weights, bound.cage.controls().rest(), &importance, &to, size);
+    let before = deform_bound(&weights, &bound.frames, bound.cage.controls().rest());
+    let (rms_before, largest_before) = distances(&before, &importance, &to, size);
     let points = importance.iter().filter(|&&w| w > 0.0).count();
     let summary = FitSummary {
         output: args.output.path.display().to_string(),
@@ -141,18 +144,15 @@ fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, C
         let (vertices, them) = if n == 1 { ("vertex is", "it") } else { ("vertices are", "them") };
         notices.push(format!("{n} {vertices} outside the cage; the fit ignores {them}"));
     }
-    Ok(Goals { weights: bound.rows(), importance, to: target.positions, notices })
+    Ok(Goals { weights: bound.weights.clone(), importance, to: target.positions, notices })
 }
 
 /// Computes the weighted root mean square and maximum of the distances of points from their targets, both divided by
 /// `size`.
-fn distances(weights: &Weights, cage: &[Vec3], importance: &[f64], to: &[Vec3], size: f64) -> (f64, f64) {
+fn distances(points: &[Vec3], importance: &[f64], to: &[Vec3], size: f64) -> (f64, f64) {
     let (mut sum, mut total, mut largest) = (0.0, 0.0, 0.0_f64);
-    for (((indices, data), share), to) in
-        weights.rows().zip(importance).zip(to).filter(|((_, s), _)| **s > 0.0)
-    {
-        let terms = indices.iter().zip(data).map(|(&i, &w)| f64::from(w) * cage[i as usize].as_dvec3());
-        let distance = terms.sum::<DVec3>().distance(to.as_dvec3()) / size;
+    for ((at, share), to) in points.iter().zip(importance).zip(to).filter(|((_, s), _)| **s > 0.0) {
+        let distance = at.as_dvec3().distance(to.as_dvec3()) / size;
         sum += share * distance * distance;
         total += share;
         largest = largest.max(distance);

@@ -36,12 +36,6 @@ pub(crate) struct BoundModel {
 }
 
 impl BoundModel {
-    /// Returns the weights with the [`Frames`] folded in, so that deformed positions are linear in the positions of the
-    /// controls. `[n_vertices, n_controls]`
-    pub(crate) fn rows(&self) -> Weights {
-        self.frames.folded(&self.weights)
-    }
-
     /// Reads model, cage and weights. Fails if an output would overwrite one of these files or of `other_inputs`.
     /// `handles`: indices of the splats or points that a pull moves or pins; `None` if the model must have faces.
     ///
@@ -143,17 +137,12 @@ impl BoundModel {
         }
     }
 
-    /// Creates the grip of a handle in the file `job`. `rows`: [`Self::rows`].
+    /// Creates the grip of a handle in the file `job`.
     ///
     /// # Errors
     /// If the handle does not exist.
-    pub(crate) fn grip(
-        &self,
-        handle: Handle,
-        pull: &Pull,
-        rows: &Weights,
-        job: &Path,
-    ) -> Result<Grip, CliError> {
+    pub(crate) fn grip(&self, handle: Handle, pull: &Pull, job: &Path) -> Result<Grip, CliError> {
+        let rows = &self.weights;
         let wrong = |e| CliError::file(job, e);
         if self.model.n_faces() > 0 {
             return Grip::new(handle, pull, &self.mesh.triangles, rows).map_err(wrong);

@@ -161,32 +161,57 @@ impl Frames {
         if !self.is_used() {
             return weights.clone();
         }
-        let holds: Vec<usize> = self.holds().map(|(joint, _)| joint).collect();
-        let n = self.plain.len().checked_div(self.joints.len()).unwrap_or(0);
+        let joints = self.hold_joints();
         let (mut indptr, mut all, mut data) = (vec![0], Vec::new(), Vec::new());
         for (indices, values) in weights.rows() {
-            let mut row = vec![0.0; n_controls];
-            for (&column, &x) in indices.iter().zip(values) {
-                match (column as usize).checked_sub(n_controls) {
-                    None => row[column as usize] += x,
-                    Some(0..3) => {}
-                    Some(frame @ 3..HOLD_COLUMN) => {
-                        self.whole.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[frame % 3]);
-                    }
-                    Some(frame) => {
-                        let slopes = &self.plain[holds[(frame - HOLD_COLUMN) / 3] * n..][..n];
-                        slopes.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[1 + frame % 3]);
-                    }
-                }
-            }
+            let entries = indices.iter().zip(values).map(|(&column, &x)| (column as usize, f64::from(x)));
+            let row = self.fold(&joints, n_controls, entries);
             let stored = (0u32..).zip(row).filter(|(_, w)| *w != 0.0);
             stored.for_each(|(column, w)| {
                 all.push(column);
-                data.push(w);
+                data.push(w as f32);
             });
             indptr.push(all.len() as u32);
         }
         Weights::from_parts(n_controls as u32, indptr, all, data)
+    }
+
+    /// Folds one row, `[n_columns]`, as [`Self::folded`] folds all. `[n_controls]`
+    ///
+    /// # Panics
+    /// If `row` is shorter than the number of these frames' columns.
+    #[must_use]
+    pub fn folded_row(&self, row: &[f64]) -> Vec<f64> {
+        self.fold(&self.hold_joints(), row.len() - self.n_columns(), row.iter().copied().enumerate())
+    }
+
+    /// Index of each hold's joint. `[n_holds]`
+    fn hold_joints(&self) -> Vec<usize> {
+        self.holds().map(|(joint, _)| joint).collect()
+    }
+
+    fn fold(
+        &self,
+        joints: &[usize],
+        n_controls: usize,
+        entries: impl Iterator<Item = (usize, f64)>,
+    ) -> Vec<f64> {
+        let n = self.plain.len().checked_div(self.joints.len()).unwrap_or(0);
+        let mut row = vec![0.0; n_controls];
+        for (column, x) in entries {
+            match column.checked_sub(n_controls) {
+                None => row[column] += x,
+                Some(0..3) => {}
+                Some(frame @ 3..HOLD_COLUMN) => {
+                    self.whole.iter().zip(&mut row).for_each(|(s, w)| *w += x * f64::from(s[frame % 3]));
+                }
+                Some(frame) => {
+                    let slopes = &self.plain[joints[(frame - HOLD_COLUMN) / 3] * n..][..n];
+                    slopes.iter().zip(&mut row).for_each(|(s, w)| *w += x * f64::from(s[1 + frame % 3]));
+                }
+            }
+        }
+        row
     }
 
     /// Distributes a vertex's rest vector over the holds (see the module) in proportion to the vertex's `weights` for

@@ -4,7 +4,7 @@ use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::deform::deform_vertices;
 use cagework_core::progress::NoProgress;
 use cagework_core::skin::skin_vertices;
-use cagework_core::{BindOptions, Bounds, TriMesh, Weights, bind, subdivided_box};
+use cagework_core::{BindOptions, Bounds, Frames, TriMesh, Weights, bind, subdivided_box};
 use cagework_editor::edit::{GestureKind, SelectMode};
 use cagework_editor::{
     Cache, Command, Contents, Document, DocumentSettings, Editor, InnerKind, Key, NewModel, PartOptions,
@@ -53,7 +53,8 @@ fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec
     let pull = Pull::new(&mesh, cage, probes, &of_probes).expect("valid input");
     let grab = Grip::new(Handle::Vertex(vertex), &pull, &mesh.triangles, weights).expect("valid input");
     let rest: Vec<DVec3> = document.pose.iter().map(|p| p.as_dvec3()).collect();
-    let mut drag = Drag::new(&pull, &rest, &[grab], &[], DragOptions::default()).expect("valid input");
+    let mut drag = Drag::new(&pull, &rest, &[grab], &[], &Frames::default(), DragOptions::default())
+        .expect("valid input");
     let to = drag.start()[0] + by;
     drag.settle(&[to]);
     drag.cage().iter().map(|p| p.as_vec3()).collect()

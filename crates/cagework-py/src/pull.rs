@@ -1,7 +1,6 @@
 //! `pull`: solves for the pose of the cage.
 
 use cagework_core::bind as bind_points;
-use cagework_core::deform::deform_bound;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::{BindOptions, TriMesh};
 use cagework_pose::pull::{DRAG_FRAMES, Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
@@ -82,16 +81,15 @@ pub(crate) fn pull<'py>(
         let of_probes = bind_points(probes.points(), controls, &options, progress).map_err(error::bind)?;
         let pull = Pull::new(&mesh, controls, probes, &of_probes.frames.folded(&of_probes.weights))
             .map_err(error::pull)?;
-        let rows = frames.folded(&weights);
         let grips = |handles: &[Handle]| -> PyResult<Vec<Grip>> {
-            let grips = handles.iter().map(|&h| Grip::new(h, &pull, &mesh.triangles, &rows));
+            let grips = handles.iter().map(|&h| Grip::new(h, &pull, &mesh.triangles, &weights));
             grips.collect::<Result<_, _>>().map_err(error::pull)
         };
         let from: Vec<DVec3> = start.iter().map(|p| p.as_dvec3()).collect();
         let drag_options = DragOptions { reach, relax, ..DragOptions::default() };
-        let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
+        let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, &frames, drag_options);
         let mut drag = drag.map_err(error::pull)?;
-        let to = drag.targets(&grabs, &to, &mesh.triangles, &deform_bound(&weights, &frames, &start));
+        let to: Vec<DVec3> = to.iter().map(|p| p.as_dvec3()).collect();
         drag.go(&to, DRAG_FRAMES);
         drag.settle(&to);
         Ok(drag.cage())

@@ -2,7 +2,7 @@
 //! it.
 
 use cagework_core::progress::NoProgress;
-use cagework_core::{BindOptions, ControlSet, TriMesh, bind};
+use cagework_core::{BindOptions, ControlSet, Frames, TriMesh, bind};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull};
 use glam::{DVec3, Vec3};
 use wasm_bindgen::JsValue;
@@ -134,7 +134,7 @@ impl Puller {
         let grips = rows.zip(seeds).map(grip).collect::<Result<Vec<_>, _>>()?;
         let (grabs, pins) = grips.split_at(n_grabs.min(grips.len()));
         let start: Vec<DVec3> = points(start).into_iter().map(Vec3::as_dvec3).collect();
-        Ok(Drag::new(&self.pull, &start, grabs, pins, options)?)
+        Ok(Drag::new(&self.pull, &start, grabs, pins, &Frames::default(), options)?)
     }
 }
 

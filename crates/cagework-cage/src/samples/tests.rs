@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::{PULLED_UNIT, Recipe, Sample, all, build, knot};
 use cagework_core::bind::bind;
 use cagework_core::cage::Cage;
+use cagework_core::frames::Frames;
 use cagework_core::geometry::winding_number;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::NoProgress;
@@ -72,7 +73,8 @@ fn the_last_pose_of_each_sample_is_that_of_its_pull() {
         let grip =
             Grip::new(Handle::Vertex(held), &pull, &mesh.triangles, &weights(&mesh.positions)).unwrap();
         let start: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();
-        let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
+        let mut drag =
+            Drag::new(&pull, &start, &[grip], &[], &Frames::default(), DragOptions::default()).unwrap();
         for _ in 0..30 {
             drag.frame(&[(mesh.positions[held as usize] + pulled.by).as_dvec3()]);
         }

@@ -58,8 +58,8 @@ pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliErr
     let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
     let (mut importance, mut to, mut n_partly) = (Vec::new(), Vec::new(), 0);
     let follows_partly = |v: u32| bound.outside.iter().any(|o| o.vertex == v && o.share < 1.0);
-    let rows = bound.rows();
-    let (n, rest) = (rows.n_columns(), bound.cage.controls().rest());
+    let rows = &bound.weights;
+    let n = rows.n_columns();
     for (k, landmark) in all.iter().enumerate() {
         let wrong = |what: String| wrong(path, &format!("landmark {k} {what}"));
         let numbers = landmark.to.iter().chain(landmark.point.iter().flatten()).map(|&x| x as f32);
@@ -77,17 +77,13 @@ pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliErr
             let (columns, weights) = rows.row(v as usize);
             columns.iter().zip(weights).for_each(|(&c, &w)| row[c as usize] += share * f64::from(w));
         }
-        // A point outside the cage has a constant offset from the position that its weights give.
-        let at = |v: u32| model.positions[v as usize].as_dvec3();
-        let point: DVec3 = used().map(|(v, share)| share * at(v)).sum();
-        let offset = point - row.iter().zip(rest).map(|(w, c)| *w * c.as_dvec3()).sum::<DVec3>();
         for (column, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
             indices.push(column as u32);
             data.push(*weight as f32);
         }
         indptr.push(indices.len() as u32);
         importance.push(landmark.weight);
-        to.push((up.turned(&[from_origin(landmark.to)])[0].as_dvec3() - offset).as_vec3());
+        to.push(up.turned(&[from_origin(landmark.to)])[0]);
     }
     let weights = Weights::new(n as u32, indptr, indices, data).map_err(|e| CliError::file(path, e))?;
     let outside_notice = (n_partly > 0).then(|| {

@@ -80,20 +80,19 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let begun = Instant::now();
     let from: Vec<DVec3> = start.iter().copied().map(Vec3::as_dvec3).collect();
     let drag_options = DragOptions { reach: job.reach, relax: job.relax, ..DragOptions::default() };
-    let rows = bound.rows();
     let grips = |handles: &[Handle]| {
-        let grips = handles.iter().map(|&h| bound.grip(h, &pull, &rows, &given.job));
+        let grips = handles.iter().map(|&h| bound.grip(h, &pull, &given.job));
         grips.collect::<Result<Vec<_>, _>>()
     };
-    let mut drag =
-        Drag::new(&pull, &from, &grips(&job.grabs)?, &grips(&job.pins)?, drag_options).map_err(wrong)?;
+    let mut drag = Drag::new(&pull, &from, &grips(&job.grabs)?, &grips(&job.pins)?, frames, drag_options)
+        .map_err(wrong)?;
     let grab_ms = since(begun);
 
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
     let deformed = |cage: &[Vec3]| deform_bound(weights, frames, cage);
     let before = deformed(&start);
     let to = job.to(model.origin());
-    let to = drag.targets(&job.grabs, &model.up().turned(&to), &mesh.triangles, &before);
+    let to: Vec<DVec3> = model.up().turned(&to).iter().map(|p| p.as_dvec3()).collect();
     let grabbed = drag.start().to_vec();
     let begun = Instant::now();
     drag.go(&to, job.frames);

@@ -1,6 +1,6 @@
 //! A drag: the matrices that are factorised when the drag starts, and its state while the pointer moves.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +9,7 @@ use super::energy::Pull;
 use super::grip::{Grip, check as check_index};
 use super::{MAX_HANDLES, PullError};
 use crate::symmetry::Symmetry;
+use cagework_core::frames::Frames;
 use cagework_core::options::{Number, Slider};
 use cagework_core::rotation::nearest_rotation;
 
@@ -87,8 +88,11 @@ pub struct Drag {
     pub(super) relax: f64,
     /// Cage positions: all x, then all y, then all z. `[3 n]`
     pub(super) cage: DVector<f64>,
-    /// Weights `Q` of the grabs, then of the pins. `[n_handles, n]`
+    /// Weights `Q` of the grabs, then of the pins, with the frames folded in ([`Frames::folded`]). `[n_handles, n]`
     pub(super) handles: DMatrix<f64>,
+    /// Weights of the grabs, then of the pins. `[n_handles, n_columns]`
+    rows: DMatrix<f64>,
+    frames: Frames,
     /// Targets of the grabs and pins. `[n_handles, 3]`
     pub(super) targets: DMatrix<f64>,
     /// Positions of the grabs at the start of the drag. `[n_grabs]`
@@ -117,7 +121,8 @@ pub struct Drag {
 }
 
 impl Drag {
-    /// Starts a drag of `grabs` with `pins` fixed, from the cage `start`, `[n]`, object units.
+    /// Starts a drag of `grabs` with `pins` fixed, from the cage `start`, `[n]`, object units. `frames`: of the bind
+    /// that the weights of the grips come from.
     ///
     /// # Errors
     /// [`PullError`]: a handle does not exist, there are too many handles, a number is out of range, or a pose is not
@@ -127,16 +132,22 @@ impl Drag {
         start: &[DVec3],
         grabs: &[Grip],
         pins: &[Grip],
+        frames: &Frames,
         options: DragOptions,
     ) -> Result<Self, PullError> {
-        check(pull, start, grabs, pins, options)?;
+        check(pull, start, grabs, pins, frames, options)?;
         let n = pull.n_cage();
         let cage_grabbed = grabs.iter().any(|grab| grab.is_cage);
         let gamma = if cage_grabbed { GRABBED_CAGE_WEIGHT } else { CAGE_WEIGHT };
         let grips: Vec<&Grip> = grabs.iter().chain(pins).collect();
-        let handles = DMatrix::from_fn(grips.len(), n, |h, i| grips[h].row[i]);
+        let n_columns = n + frames.n_columns();
+        let rows =
+            DMatrix::from_fn(grips.len(), n_columns, |h, i| grips[h].row.get(i).copied().unwrap_or(0.0));
+        let folded: Vec<Vec<f64>> =
+            rows.row_iter().map(|row| frames.folded_row(&row.iter().copied().collect::<Vec<_>>())).collect();
+        let handles = DMatrix::from_fn(grips.len(), n, |h, i| folded[h][i]);
         let cage = DMatrix::from_fn(n, 3, |i, x| start[i][x]);
-        let targets = &handles * &cage;
+        let targets = places(&rows, frames, &cage);
 
         let seeds: Vec<u32> = grips.iter().map(|grip| grip.seed).collect();
         let distances: Vec<Vec<f32>> =
@@ -211,6 +222,8 @@ impl Drag {
             cage: flat(start),
             start: (0..grabs.len()).map(start_of).collect(),
             handles,
+            rows,
+            frames: frames.clone(),
             targets,
             inverse,
             spread,
@@ -274,10 +287,36 @@ impl Drag {
     /// Largest distance of a grab or pin from its target, as a fraction of the model's size.
     #[must_use]
     pub fn error(&self) -> f64 {
-        let cage = DMatrix::from_column_slice(self.n, 3, self.cage.as_slice());
-        let off = &self.handles * cage - &self.targets;
+        let off = self.places() - &self.targets;
         off.row_iter().map(|row| row.norm()).fold(0.0, f64::max) / self.size
     }
+
+    /// Positions of the grabs and pins. `[n_handles, 3]`, object units
+    pub(super) fn places(&self) -> DMatrix<f64> {
+        places(&self.rows, &self.frames, &self.cage_matrix())
+    }
+
+    /// Part of the positions of the grabs and pins that is not linear in the cage: the effect of rotated bones, and
+    /// constant offsets. `[n_handles, 3]`, object units
+    pub(super) fn bends(&self) -> DMatrix<f64> {
+        self.places() - &self.handles * self.cage_matrix()
+    }
+
+    fn cage_matrix(&self) -> DMatrix<f64> {
+        DMatrix::from_column_slice(self.n, 3, self.cage.as_slice())
+    }
+}
+
+/// Positions of points with the weights `rows`, `[n_points, n_columns]`, in the pose `cage`, `[n, 3]`. `[n_points, 3]`
+fn places(rows: &DMatrix<f64>, frames: &Frames, cage: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = cage.nrows();
+    let narrow: Vec<Vec3> = cage.row_iter().map(|p| DVec3::new(p[0], p[1], p[2]).as_vec3()).collect();
+    let of_frames = &frames.columns(&narrow)[n..];
+    let columns = DMatrix::from_fn(rows.ncols(), 3, |i, x| match i.checked_sub(n) {
+        None => cage[(i, x)],
+        Some(frame) => f64::from(of_frames[frame][x]),
+    });
+    rows * columns
 }
 
 fn check(
@@ -285,6 +324,7 @@ fn check(
     start: &[DVec3],
     grabs: &[Grip],
     pins: &[Grip],
+    frames: &Frames,
     options: DragOptions,
 ) -> Result<(), PullError> {
     if grabs.is_empty() {
@@ -296,8 +336,9 @@ fn check(
     }
     for grip in grabs.iter().chain(pins) {
         check_index("vertex of the model", grip.seed, pull.n_vertices)?;
-        if grip.row.len() != pull.n_cage() {
-            let (rows, columns, vertices) = (1, grip.row.len(), 1);
+        let n_frames = if grip.is_cage { 0 } else { frames.n_columns() };
+        if grip.row.len() != pull.n_cage() + n_frames || !frames.fits(pull.n_cage()) {
+            let (rows, columns, vertices) = (1, grip.row.len().saturating_sub(n_frames), 1);
             return Err(PullError::Shape { rows, columns, vertices, controls: pull.n_cage() });
         }
         if let Some(&value) = grip.row.iter().find(|w| !w.is_finite()) {

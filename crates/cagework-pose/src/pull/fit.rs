@@ -9,6 +9,8 @@ use super::energy::Pull;
 use super::frame::turned;
 use super::{MAX_CONTROLS, PullError};
 use crate::parts::Motion;
+use cagework_core::deform::{deform_bound, deform_vertices};
+use cagework_core::frames::Frames;
 use cagework_core::weights::Weights;
 
 /// Range of lambda, the weight of the energy E ([`super`]), if it is estimated from the noise of the targets. With the
@@ -33,6 +35,13 @@ const MAX_STEPS: usize = 2000;
 
 /// Local-global steps stop when the cage moves by less than this in a step, as a fraction of the model's size.
 const MIN_STEP_MOVE: f64 = 1e-8;
+
+/// Limit on the fits of a model with bones.
+const MAX_FITS: usize = 20;
+
+/// These fits stop when no shifted target changes by more than this, as a fraction of the model's size. Each fit makes
+/// the change about ten times smaller.
+const MIN_TARGET_CHANGE: f64 = 1e-5;
 
 /// Options of [`Pull::fit`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,13 +95,54 @@ impl Pull {
     /// Minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`. E is the first sum of the energy of a pull
     /// ([`crate::pull`]), with the rest shape as reference.
     ///
-    /// `weights`: rows of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight `m_k` of each point,
-    /// scaled to sum to 1; a point with the share 0 is ignored. `to`: targets, object units.
+    /// `weights`: rows of the points (vertices or landmarks), `[n_points, n_columns]`, and the `frames` of their bind.
+    /// `shares`: weight `m_k` of each point, scaled to sum to 1; a point with the share 0 is ignored. `to`: targets,
+    /// object units.
+    ///
+    /// The solver needs positions that are linear in the cage, as with [`Frames::folded`]. Rotated bones and constant
+    /// offsets add the rest. It is computed from the fitted pose and subtracted from the targets, and the fit repeated
+    /// until the rest no longer changes.
     ///
     /// # Errors
     /// [`PullError`]: the weights belong to another cage, lengths differ, no point has a target, or numbers are out of
     /// range.
     pub fn fit(
+        &self,
+        weights: &Weights,
+        frames: &Frames,
+        shares: &[f64],
+        to: &[Vec3],
+        options: FitOptions,
+    ) -> Result<Fit, PullError> {
+        let (rows, columns, n) = (weights.n_rows(), weights.n_columns(), self.n_cage());
+        if columns != n + frames.n_columns() || !frames.fits(n) {
+            let columns = columns.saturating_sub(frames.n_columns());
+            return Err(PullError::Shape { rows, columns, vertices: shares.len(), controls: n });
+        }
+        let linear = frames.folded(weights);
+        let mut shifted = to.to_vec();
+        let mut fitted = self.fit_linear(&linear, shares, &shifted, options)?;
+        if !frames.is_used() {
+            return Ok(fitted);
+        }
+        for _ in 1..MAX_FITS {
+            let pose: Vec<Vec3> = fitted.cage.iter().map(|p| p.as_vec3()).collect();
+            let rest = deform_bound(weights, frames, &pose);
+            let rest =
+                rest.iter().zip(deform_vertices(&linear, &pose)).map(|(exact, linear)| *exact - linear);
+            let next: Vec<Vec3> = to.iter().zip(rest).map(|(to, rest)| *to - rest).collect();
+            let pairs = next.iter().zip(&shifted).zip(shares).filter(|(_, share)| **share > 0.0);
+            let change = pairs.map(|((a, b), _)| f64::from(a.distance(*b))).fold(0.0, f64::max);
+            if change <= MIN_TARGET_CHANGE * self.size || !change.is_finite() {
+                return Ok(fitted);
+            }
+            shifted = next;
+            fitted = self.fit_linear(&linear, shares, &shifted, options)?;
+        }
+        Ok(Fit { is_settled: false, ..fitted })
+    }
+
+    fn fit_linear(
         &self,
         weights: &Weights,
         shares: &[f64],

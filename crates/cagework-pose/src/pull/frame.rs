@@ -1,10 +1,9 @@
 //! A frame of a drag: alternates rotations of the groups (local step) with a solve for the cage (global step).
 
-use glam::{DMat3, DQuat, DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, group_matrices, smooth};
-use super::grip::Handle;
 use crate::symmetry::Symmetry;
 use cagework_core::rotation::nearest_rotation;
 
@@ -34,16 +33,15 @@ impl Drag {
             return;
         }
         if self.is_shift {
-            let row = self.handles.row(0).transpose();
             // A shift of the cage moves the point by this share of the shift.
-            let share = row.sum();
+            let share = self.handles.row(0).sum();
             if share < MIN_SHARE {
                 return;
             }
+            let place = self.places();
             for (x, target) in to[0].to_array().into_iter().enumerate() {
                 let mut column = self.cage.rows_mut(x * self.n, self.n);
-                let shift = (target - row.dot(&column)) / share;
-                column.add_scalar_mut(shift);
+                column.add_scalar_mut((target - place[(0, x)]) / share);
             }
             self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));
             return;
@@ -97,33 +95,6 @@ impl Drag {
         frames
     }
 
-    /// Computes the targets of the drag that bring the grabbed handles to `to`. A point outside the cage has a constant
-    /// offset from the position that its weights give, so its target is shifted by this offset. `triangles`: those of
-    /// the model, `[n_triangles]`; `deformed`: the model at the start of the drag, `[n_vertices]`, object units.
-    ///
-    /// # Panics
-    /// If a handle refers to a triangle or vertex that does not exist.
-    #[must_use]
-    pub fn targets(
-        &self,
-        grabs: &[Handle],
-        to: &[Vec3],
-        triangles: &[[u32; 3]],
-        deformed: &[Vec3],
-    ) -> Vec<DVec3> {
-        let at = |v: u32| deformed[v as usize].as_dvec3();
-        let beside = |(grab, start): (&Handle, &DVec3)| match *grab {
-            Handle::Vertex(v) => at(v) - *start,
-            Handle::Triangle(t, bary) => {
-                let corners = triangles[t as usize];
-                (0..3).map(|k| bary[k] * at(corners[k])).sum::<DVec3>() - *start
-            }
-            Handle::Cage(_) => DVec3::ZERO,
-        };
-        let beside = grabs.iter().zip(&self.start).map(beside);
-        to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
-    }
-
     fn target(&self, h: usize) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|x| self.targets[(h, x)]))
     }
@@ -149,7 +120,7 @@ impl Drag {
     fn step(&self) -> DVector<f64> {
         let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
-        let pulled = &self.targets - &self.handles * &free;
+        let pulled = &self.targets - self.bends() - &self.handles * &free;
         let fitted = free + &self.spread * (&self.hold * pulled);
         DVector::from_column_slice(fitted.as_slice())
     }

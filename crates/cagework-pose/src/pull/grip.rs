@@ -29,7 +29,8 @@ pub enum Handle {
 /// A handle with the weights of the controls at its point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grip {
-    /// Weights of the controls at the point. `[n_cage]`
+    /// Weights of the controls at the point, then of the [frames](cagework_core::Frames), which a grip on a control
+    /// lacks. `[n_columns]`
     pub(super) row: Vec<f64>,
     /// Vertex of the model from which surface distances are measured.
     pub(super) seed: u32,
@@ -37,7 +38,7 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// Creates a grip at a point of the model from its weights, `[n_cage]`, and its nearest vertex.
+    /// Creates a grip at a point of the model from its weights, `[n_columns]`, and its nearest vertex.
     /// [`super::Drag::new`] checks both.
     #[must_use]
     pub fn of_row(row: Vec<f64>, seed: u32) -> Self {
@@ -57,7 +58,7 @@ impl Grip {
     ) -> Result<Self, PullError> {
         let (rows, columns, vertices, controls) =
             (weights.n_rows(), weights.n_columns(), pull.n_vertices, pull.n_cage());
-        if (rows, columns) != (vertices, controls) {
+        if rows != vertices || columns < controls {
             return Err(PullError::Shape { rows, columns, vertices, controls });
         }
         match handle {
@@ -72,7 +73,7 @@ impl Grip {
                 }
                 let corners = triangles[t as usize];
                 let rows = corners.map(|v| dense(weights, v as usize));
-                let row = (0..controls).map(|i| (0..3).map(|k| bary[k] * rows[k][i]).sum()).collect();
+                let row = (0..columns).map(|i| (0..3).map(|k| bary[k] * rows[k][i]).sum()).collect();
                 let most = (0..3).max_by(|&a, &b| bary[a].total_cmp(&bary[b])).unwrap_or(0);
                 Ok(Self::of_row(row, corners[most]))
             }

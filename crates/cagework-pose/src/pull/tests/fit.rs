@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3, Vec3};
 use super::{BoundSample, bound, humanoid};
 use crate::pull::{Fit, FitOptions, PullError};
 use cagework_core::deform::deform_vertices;
+use cagework_core::frames::Frames;
 
 /// A map that bends, twists, stretches and translates the cage. Its lengths are fractions of the model's size.
 fn moved(bound: &BoundSample, cage: &[DVec3]) -> Vec<DVec3> {
@@ -46,7 +47,9 @@ impl BoundSample {
     }
 
     fn fit(&self, to: &[Vec3], lambda: Option<f64>) -> Fit {
-        self.pull.fit(&self.weights, self.pull.areas(), to, FitOptions { lambda }).unwrap()
+        self.pull
+            .fit(&self.weights, &Frames::default(), self.pull.areas(), to, FitOptions { lambda })
+            .unwrap()
     }
 }
 
@@ -102,7 +105,7 @@ fn rigidly_moved_landmarks_move_the_model_rigidly() {
     let rows = [0, 3000, 9000, 15000, 21000];
     let weights = bound.weights.with_rows(&rows);
     let to: Vec<Vec3> = rows.map(|v| map(bound.mesh.positions[v as usize].as_dvec3()).as_vec3()).to_vec();
-    let fitted = bound.pull.fit(&weights, &[1.0; 5], &to, FitOptions::default()).unwrap();
+    let fitted = bound.pull.fit(&weights, &Frames::default(), &[1.0; 5], &to, FitOptions::default()).unwrap();
     let truth: Vec<Vec3> = bound.rest().into_iter().map(|p| map(p).as_vec3()).collect();
     let [_, largest] = apart(&narrow(&fitted.cage), &truth, bound.size);
     assert!(largest <= 1e-4 && fitted.energy < 1e-6, "{largest:e}, energy {:e}", fitted.energy);
@@ -121,7 +124,9 @@ fn landmarks_are_met_and_a_larger_lambda_lowers_the_energy() {
     // Raise the hand by a tenth of the model's size.
     to[0].y += 0.1 * bound.size as f32;
     let fits: Vec<Fit> = [None, Some(1e-3), Some(1e-1)]
-        .map(|lambda| bound.pull.fit(&weights, &[1.0; 5], &to, FitOptions { lambda }).unwrap())
+        .map(|lambda| {
+            bound.pull.fit(&weights, &Frames::default(), &[1.0; 5], &to, FitOptions { lambda }).unwrap()
+        })
         .into();
     assert!(fits[0].largest <= 1e-3, "{:e}", fits[0].largest);
     for pair in fits.windows(2) {
@@ -134,7 +139,7 @@ fn invalid_fits_are_errors() {
     let bound = humanoid();
     let (n, rest) = (bound.weights.n_rows(), bound.mesh.positions.clone());
     let fit = |shares: &[f64], to: &[Vec3], lambda| {
-        bound.pull.fit(&bound.weights, shares, to, FitOptions { lambda }).unwrap_err()
+        bound.pull.fit(&bound.weights, &Frames::default(), shares, to, FitOptions { lambda }).unwrap_err()
     };
     let areas = bound.pull.areas();
     assert_eq!(fit(areas, &rest[1..], None), PullError::Targets { given: n - 1, points: n });
@@ -147,5 +152,5 @@ fn invalid_fits_are_errors() {
     // A vertex with zero weight may have any target.
     let mut shares = areas.to_vec();
     shares[7] = 0.0;
-    bound.pull.fit(&bound.weights, &shares, &broken, FitOptions::default()).unwrap();
+    bound.pull.fit(&bound.weights, &Frames::default(), &shares, &broken, FitOptions::default()).unwrap();
 }
