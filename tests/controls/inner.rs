@@ -2,7 +2,9 @@ use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::{Method, Solver};
 use cagework_core::progress::NoProgress;
-use cagework_core::{BindOptions, Binding, ControlSet, Controls, InnerControls, InnerElement};
+use cagework_core::{
+    BindOptions, Binding, Bounds, ControlSet, Controls, InnerControls, InnerElement, subdivided_box,
+};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use cagework_tests::cages::{blocks, cage, cuboid, icosphere};
 use cagework_tests::creature::creature;
@@ -260,6 +262,26 @@ fn points_inside_a_ball_follow_it() {
     let posed = deform_bound(&binding.weights, &binding.frames, &controls);
     for (p, at) in points.iter().zip(posed) {
         assert!(at.distance(*p + by) < 1e-6, "{p}: {at}");
+    }
+}
+
+/// Points inside a ball follow it even if the ball reaches through the cage, and do not count as outside the cage.
+#[test]
+fn points_inside_a_ball_that_reaches_through_the_cage_follow_it() {
+    let walls = cage(&subdivided_box(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }, 0.0, [1; 3]));
+    for (y, reaches) in [(0.93, false), (0.95, true), (0.99, true)] {
+        let set = ControlSet::new(&walls, 0, points_at(&[y * Vec3::Y], 0.0625)).unwrap();
+        assert_eq!(set.reaching(), if reaches { &[0][..] } else { &[] }, "{y}");
+        let points: Vec<Vec3> = [-0.05, -0.02, 0.0, 0.005].map(|d| (y + d) * Vec3::Y).into();
+        let binding = bound(&points, &set, |options| options.grid = 32);
+        assert!(binding.outside.is_empty(), "{y}: {:?}", binding.outside);
+        let notice = binding.report.notices.iter().any(|notice| notice.contains("through the cage"));
+        assert_eq!(notice, reaches, "{:?}", binding.report.notices);
+        let mut controls = Controls::from(&set).rest().to_vec();
+        controls[8] += 0.1 * Vec3::X;
+        for (p, at) in points.iter().zip(deform_bound(&binding.weights, &binding.frames, &controls)) {
+            assert!(at.distance(*p + 0.1 * Vec3::X) < 1e-6, "{y}, {p}: {at}");
+        }
     }
 }
 

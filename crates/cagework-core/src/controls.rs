@@ -82,6 +82,11 @@ impl<'a> Controls<'a> {
         self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
     }
 
+    /// As [`ControlSet::reaching`].
+    pub(crate) fn reaching(&self) -> &'a [u32] {
+        self.set.map_or(&[], ControlSet::reaching)
+    }
+
     /// Radius of balls and tubes, object units; `None` without inner controls.
     #[must_use]
     pub fn inner_radius(&self) -> Option<f32> {

@@ -33,10 +33,7 @@ impl<'a> Offsets<'a> {
         blocks: &[Vec<Row>],
         joints: Option<(JointPoints<'_>, Weights)>,
     ) -> Self {
-        let of_cage = |triangle: u32| {
-            controls.cage_face(controls.surface().face_of_facet()[triangle as usize]).is_some()
-        };
-        let outside = stencils.outside.iter().filter(|o| of_cage(o.triangle));
+        let outside = stencils.outside.iter().filter(|o| !o.is_held);
         let row = |point: u32| blocks.iter().map(|block| block[point as usize]).collect();
         let outside = outside.map(|o| (o.vertex, o.share, row(o.vertex))).collect();
         let mut all = Self { controls, outside, frames: Frames::default(), lengths: Vec::new(), radius: 0.0 };

@@ -12,7 +12,7 @@ use crate::controls::Controls;
 use crate::deform::OutsideVertex;
 use crate::mesh::Bounds;
 use crate::options::{BindOptions, OutsidePolicy};
-use crate::sample::{OutsidePoint, Stencils};
+use crate::sample::Stencils;
 use crate::weights::Weights;
 
 /// Ratio of sizes from which cage and model are assumed to have different units. Feet and metres differ by 3.3; a cage
@@ -91,9 +91,7 @@ pub(super) fn refuse_outside(
 ) -> Result<(), BindError> {
     let positions = mesh.positions;
     let cage = controls.surface();
-    let near_cage =
-        |o: &&OutsidePoint| controls.cage_face(cage.face_of_facet()[o.triangle as usize]).is_some();
-    let outside = stencils.outside.iter().filter(near_cage);
+    let outside = stencils.outside.iter().filter(|o| !o.is_held);
     if outside.clone().count() == stencils.len() {
         return Err(none_inside(cage, positions));
     }

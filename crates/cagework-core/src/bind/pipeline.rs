@@ -22,6 +22,7 @@ use crate::sample::{OutsidePoint, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::team::{Team, VERTEX_RUN};
 use crate::weights::Weights;
+use crate::words::counted;
 
 use super::memory::{estimate, needs_all};
 use super::offsets::{JointPoints, Offsets};
@@ -197,7 +198,7 @@ impl<'a> PreparedBind<'a> {
         let mut notices = crossing::notices(controls.cage());
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
-        let (outside, held_vertices) = outside_of(controls, &stencils.outside, &welded, n_vertices);
+        let (outside, held_vertices) = outside_of(&stencils.outside, &welded, n_vertices);
         let vertices = &positions[..n_vertices];
         notices.extend(oversized(cage.bounds(), vertices, &outside, &weights, controls.n_controls()));
         notices.extend(solved.report.stalled.then(|| STALL_NOTICE.to_owned()));
@@ -325,19 +326,13 @@ fn sampling_stencils(
 
 /// Returns the vertices outside the cage, and the number of vertices among the first `n_vertices` that lie inside a
 /// ball or tube.
-fn outside_of(
-    controls: Controls<'_>,
-    points: &[OutsidePoint],
-    welded: &Weld,
-    n_vertices: usize,
-) -> (Vec<OutsideVertex>, u64) {
+fn outside_of(points: &[OutsidePoint], welded: &Weld, n_vertices: usize) -> (Vec<OutsideVertex>, u64) {
     let (mut outside, mut n_held) = (Vec::new(), 0);
     let of_point = |point: u32| points.binary_search_by_key(&point, |o| o.vertex).ok().map(|k| points[k]);
     let found =
         (0u32..).zip(&welded.unique_of).filter_map(|(vertex, &point)| Some((vertex, of_point(point)?)));
     for (vertex, o) in found {
-        let face = controls.surface().face_of_facet()[o.triangle as usize];
-        if controls.cage_face(face).is_some() {
+        if !o.is_held {
             outside.push(OutsideVertex { vertex, distance: o.distance as f32, share: o.share as f32 });
         } else if (vertex as usize) < n_vertices {
             n_held += 1;
@@ -347,7 +342,7 @@ fn outside_of(
 }
 
 /// Returns notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side,
-/// and vertices that no element uses.
+/// balls and tubes that reach through the cage, and vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let (Some(inner), Some(radius)) = (controls.inner(), controls.inner_radius()) else { return Vec::new() };
     let mut notices = Vec::new();
@@ -357,6 +352,15 @@ fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
         notices.push(format!(
             "The radius of the controls inside, {radius:.3e}, is below a cell of this grid, {cell:.3e}: their reach depends on \
              their position in the grid. Use a grid of {finer} cells, or a larger radius."
+        ));
+    }
+    if let (n @ 1.., Some(first)) = (controls.reaching().len(), controls.reaching().first()) {
+        let them = if n == 1 { "it" } else { "them" };
+        notices.push(format!(
+            "{} inside (element {first}) {} through the cage, whose surface keeps its own values there: use a radius \
+             below {radius:.3e}, or move {them} inwards.",
+            counted(n, "ball or tube", "balls and tubes"),
+            if n == 1 { "reaches" } else { "reach" },
         ));
     }
     if let (n @ 1.., Some(first)) = (inner.unused().len(), inner.unused().first()) {

@@ -177,9 +177,9 @@ impl InnerControls {
         rounded.flat_map(InnerElement::corners).any(|&i| i as usize == control)
     }
 
-    /// Finds the point on the axes of balls and tubes that is closest to `place`, as two controls with their shares.
-    /// `None` without balls and tubes.
-    pub(crate) fn foot(&self, place: DVec3) -> Option<[(u32, f64); 2]> {
+    /// Finds the point on the axes of balls and tubes that is closest to `place`: its distance, object units, and two
+    /// controls with their shares. `None` without balls and tubes.
+    pub(crate) fn foot(&self, place: DVec3) -> Option<(f64, [(u32, f64); 2])> {
         let at = |i: u32| self.positions[i as usize].as_dvec3();
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
         let ends = rounded.flat_map(|element| match element.corners() {
@@ -192,7 +192,7 @@ impl InnerControls {
                 ((place - from).dot(way) / way.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             (place.distance_squared(from + share * way), [(a, 1.0 - share), (b, share)])
         });
-        feet.min_by(|(d, _), (e, _)| d.total_cmp(e)).map(|(_, shares)| shares)
+        feet.min_by(|(d, _), (e, _)| d.total_cmp(e)).map(|(squared, shares)| (squared.sqrt(), shares))
     }
 
     /// Vertices that no element uses; they have no influence.

@@ -34,6 +34,8 @@ pub struct ControlSet {
     rows: Option<Weights>,
     /// Cage face of each surface face; `None` for an inner wall. `[n_surface_faces]`
     origins: Vec<Option<u32>>,
+    /// Balls and tubes that intersect the cage's surface, as indices of elements, ascending.
+    reaching: Vec<u32>,
 }
 
 impl<'a> From<&'a ControlSet> for Controls<'a> {
@@ -58,6 +60,7 @@ impl ControlSet {
             surface: cage.clone(),
             rows: None,
             origins: (0..cage.faces().len() as u32).map(Some).collect(),
+            reaching: Vec::new(),
         }
     }
 
@@ -101,6 +104,12 @@ impl ControlSet {
         &self.inner
     }
 
+    /// Balls and tubes that reach through the cage's surface, as indices of elements, ascending.
+    #[must_use]
+    pub fn reaching(&self) -> &[u32] {
+        &self.reaching
+    }
+
     /// Computes the positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`,
     /// object units). Balls and tubes are translated without rotation, so they keep their radius. `[n_surface]`
     ///
@@ -138,6 +147,7 @@ impl ControlSet {
             }
         }
 
+        self.reaching = walls.reaching(&inner, &self.surface);
         let n_cage = self.rest.len() as u32;
         let first = self.surface.n_vertices() as u32;
         let faces: Vec<Vec<u32>> =
@@ -274,9 +284,8 @@ impl Walls {
         self.part_of.push(part);
     }
 
-    /// Finds the pairs of unconnected elements whose meshes intersect. The list is incomplete if the search reaches a
-    /// limit of [`crate::contact`].
-    fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
+    /// The triangles of all meshes, and the element of each.
+    fn triangles(&self) -> (Vec<Corners>, Vec<u32>) {
         let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
         for (face, &element) in self.faces.iter().zip(&self.element_of) {
             for k in 2..face.len() {
@@ -285,6 +294,36 @@ impl Walls {
                 element_of.push(element);
             }
         }
+        (triangles, element_of)
+    }
+
+    /// Finds the balls and tubes whose meshes intersect the cage's surface. The list is incomplete if the search
+    /// reaches a limit of [`crate::contact`].
+    fn reaching(&self, inner: &InnerControls, surface: &Cage) -> Vec<u32> {
+        let (mut triangles, element_of) = self.triangles();
+        let first = self.points.len() as u32;
+        triangles.extend((0u32..).zip(surface.facets()).map(|(facet, corners)| Corners {
+            index: corners.map(|i| first + i),
+            at: surface.facet_corners(facet),
+        }));
+        let mut reaching = Vec::new();
+        each_meeting(&triangles, |pair| {
+            if let [Some(&element), None] | [None, Some(&element)] = pair.map(|t| element_of.get(t as usize))
+            {
+                reaching.push(element);
+            }
+            ControlFlow::Continue(())
+        });
+        reaching.retain(|&element| !matches!(inner.elements[element as usize], InnerElement::Face(_)));
+        reaching.sort_unstable();
+        reaching.dedup();
+        reaching
+    }
+
+    /// Finds the pairs of unconnected elements whose meshes intersect. The list is incomplete if the search reaches a
+    /// limit of [`crate::contact`].
+    fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
+        let (triangles, element_of) = self.triangles();
         let parts = parts(inner);
         let mut meeting = Vec::new();
         each_meeting(&triangles, |pair| {

@@ -15,17 +15,19 @@ use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
-/// A vertex outside the cage with its closest point on the cage.
+/// A vertex outside the cage, or inside a ball or tube, with its closest point on the surface of the controls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsidePoint {
     /// Index of the vertex in the mesh.
     pub vertex: u32,
-    /// Facet of the cage with the closest point.
+    /// Facet of the surface with the closest point.
     pub triangle: u32,
     /// Barycentric coordinates of the closest point in `triangle`.
     pub barycentric: [f64; 3],
-    /// Distance of the vertex from the closest point of the cage, object units.
+    /// Distance of the vertex from the closest point, object units.
     pub distance: f64,
+    /// Whether the vertex is inside a ball or tube, rather than outside the cage.
+    pub is_held: bool,
     /// Share of the cage's motion that the vertex follows, 0 to 1.
     pub share: f64,
 }

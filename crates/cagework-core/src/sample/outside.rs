@@ -32,8 +32,8 @@ impl<'a> OutsideSampler<'a> {
     }
 
     /// Computes the stencil of a point outside the surface. A point inside a ball or tube takes the values of the
-    /// closest point on the axes of balls and tubes. `inside(q, stencil)` computes the stencil of a point q inside, or
-    /// returns false. The result has `vertex` 0.
+    /// closest point on the axes of balls and tubes, even if the ball or tube reaches through the cage. `inside(q,
+    /// stencil)` computes the stencil of a point q inside, or returns false. The result has `vertex` 0.
     pub(super) fn fill(
         &self,
         point: DVec3,
@@ -42,24 +42,29 @@ impl<'a> OutsideSampler<'a> {
     ) -> OutsidePoint {
         let surface = self.controls.surface();
         let ClosestPoint { facet, barycentric, distance } = self.closest.find(point);
-        let mut found = OutsidePoint { vertex: 0, triangle: facet, barycentric, distance, share: 1.0 };
+        let of_cage = self.controls.cage_face(surface.face_of_facet()[facet as usize]).is_some();
+        let is_held = !of_cage;
+        let mut found =
+            OutsidePoint { vertex: 0, triangle: facet, barycentric, distance, is_held, share: 1.0 };
         stencil.clear();
         self.controls.values_at(found.triangle, found.barycentric, &mut |column, value| {
             stencil.add_hat(column, value);
         });
         let diagonal = f64::from(surface.diagonal());
-        let of_cage = self.controls.cage_face(surface.face_of_facet()[found.triangle as usize]).is_some();
         if distance <= CAGE_TOLERANCE * diagonal {
             return found;
         }
-        if !of_cage {
-            // Where tubes meet, the closest facet may lie inside another tube: use the closest point on the axes of the
-            // tubes.
-            if let Some(shares) = self.controls.inner().and_then(|inner| inner.foot(point)) {
-                stencil.clear();
-                let first = self.controls.cage().n_vertices() as u32;
-                shares.into_iter().for_each(|(control, share)| stencil.add_hat(first + control, share));
-            }
+        // Where tubes meet, the closest facet may lie inside another tube, and where a tube is near the cage, it may be
+        // one of the cage: use the closest point on the axes of the tubes.
+        let foot = self.controls.inner().and_then(|inner| inner.foot(point));
+        let radius = self.controls.inner_radius().map_or(0.0, f64::from);
+        if let Some((_, shares)) = foot.filter(|(away, _)| is_held || *away < radius) {
+            stencil.clear();
+            let first = self.controls.cage().n_vertices() as u32;
+            shares.into_iter().for_each(|(control, share)| stencil.add_hat(first + control, share));
+            found.is_held = true;
+        }
+        if found.is_held {
             return found;
         }
         found.share = self.share(distance / diagonal);
