@@ -26,6 +26,17 @@ const MIN_ARC_ANGLE: f64 = 0.5;
 const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {
+    /// Like [`Self::frame`]. For a drag of one grab and its mirror image, the target of the image may be omitted.
+    pub fn frame_with_image(&mut self, to: &[DVec3]) {
+        match (to, &*self.start) {
+            // The image moves by the reflected displacement of the grab.
+            (&[to], &[first, image]) => {
+                self.frame(&[to, image + (to - first) * DVec3::new(-1.0, 1.0, 1.0)]);
+            }
+            _ => self.frame(to),
+        }
+    }
+
     /// Runs one frame with the grabs at `to` (`[n_grabs]`, object units). If the grabs rotate together by more than 0.5
     /// radians, runs intermediate frames first. Ignores targets that are not finite, so the pose stays finite.
     pub fn frame(&mut self, to: &[DVec3]) {

@@ -15,6 +15,9 @@ pub fn is_barycentric(bary: [f64; 3]) -> bool {
     bary.iter().all(|b| *b >= -BARYCENTRIC_TOLERANCE) && (sum - 1.0).abs() <= BARYCENTRIC_TOLERANCE
 }
 
+/// Seed of a grip on a cage vertex in [`Grip::of_seed`].
+pub const CAGE_SEED: u32 = u32::MAX;
+
 /// A point that can be grabbed or pinned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Handle {
@@ -43,6 +46,18 @@ impl Grip {
     #[must_use]
     pub fn of_row(row: Vec<f64>, seed: u32) -> Self {
         Self { row, seed, is_cage: false }
+    }
+
+    /// Like [`Self::of_row`]; if `seed` is [`CAGE_SEED`], creates a grip on the cage vertex whose weight in `row` is 1.
+    ///
+    /// # Errors
+    /// [`PullError::Missing`] if no weight is 1.
+    pub fn of_seed(row: Vec<f64>, seed: u32, pull: &Pull) -> Result<Self, PullError> {
+        if seed != CAGE_SEED {
+            return Ok(Self::of_row(row, seed));
+        }
+        let vertex = row.iter().position(|&w| w == 1.0).unwrap_or(usize::MAX);
+        pull.on_cage(vertex as u32)
     }
 
     /// Creates the grip of a handle. `triangles` and `weights`: triangles and weights of the model.

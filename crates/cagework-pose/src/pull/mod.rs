@@ -37,7 +37,7 @@ use thiserror::Error;
 pub use drag::{Drag, DragOptions, REACH, Reach};
 pub use energy::Pull;
 pub use fit::{Fit, FitOptions};
-pub use grip::{Grip, Handle, is_barycentric};
+pub use grip::{CAGE_SEED, Grip, Handle, is_barycentric};
 pub use samples::Probes;
 
 /// Limit on grabs and pins together, because a drag inverts a dense matrix of that size.
