@@ -8,6 +8,7 @@
 
 pub mod bind;
 pub mod buffers;
+pub mod canvas;
 pub mod deform;
 pub mod device;
 pub mod error;
