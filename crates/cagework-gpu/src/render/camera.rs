@@ -7,6 +7,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use cagework_core::Bounds;
 use glam::{Mat4, Vec2, Vec3, Vec4};
+use serde::{Deserialize, Serialize};
 
 /// Vertical field of view, radians: 35 degrees, a short telephoto lens with little distortion.
 const FOV_Y: f32 = 35.0 * PI / 180.0;
@@ -58,6 +59,21 @@ pub enum AxisView {
     Bottom,
 }
 
+impl AxisView {
+    /// The view along an axis, 0 to 2, from its positive or negative end.
+    #[must_use]
+    pub fn from_end(axis: u32, is_negative: bool) -> Self {
+        match (axis, is_negative) {
+            (0, false) => Self::Right,
+            (0, true) => Self::Left,
+            (1, false) => Self::Top,
+            (1, true) => Self::Bottom,
+            (_, false) => Self::Front,
+            (_, true) => Self::Back,
+        }
+    }
+}
+
 /// A half line in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -83,6 +99,20 @@ pub struct CameraPlace {
     yaw: f32,
     pitch: f32,
     distance: f32,
+}
+
+/// Position, direction and projection of a camera, as links contain them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct CameraView {
+    /// Point that the camera orbits, object units.
+    target: [f32; 3],
+    /// Rotation of the camera about y, radians; `pitch` is its elevation above the horizon.
+    yaw: f32,
+    pitch: f32,
+    /// Distance from the eye to the target, object units.
+    distance: f32,
+    parallel: bool,
 }
 
 /// A camera that orbits around a target.
@@ -129,6 +159,28 @@ impl Default for Camera {
 }
 
 impl Camera {
+    /// Position, direction and projection.
+    #[must_use]
+    pub fn view(&self) -> CameraView {
+        let Self { target, yaw, pitch, distance, projection, .. } = *self;
+        let parallel = projection == Projection::Orthographic;
+        CameraView { target: target.to_array(), yaw, pitch, distance, parallel }
+    }
+
+    /// Sets position, direction and projection. Returns false and changes nothing if a number is not finite or out of
+    /// range.
+    pub fn set_view(&mut self, view: CameraView) -> bool {
+        let CameraView { target, yaw, pitch, distance, parallel } = view;
+        let is_finite = Vec3::from(target).is_finite() && yaw.is_finite() && distance.is_finite();
+        let is_view = is_finite && pitch.abs() <= FRAC_PI_2 && distance > 0.0;
+        if is_view {
+            (self.target, self.yaw, self.pitch, self.distance) = (target.into(), yaw, pitch, distance);
+            self.projection = if parallel { Projection::Orthographic } else { Projection::Perspective };
+            self.keep_visible();
+        }
+        is_view
+    }
+
     /// Width and height of the picture in pixels, at least 1.
     #[must_use]
     pub fn viewport(&self) -> Vec2 {

@@ -3,6 +3,8 @@
 //! Source: Nuñez, Anderton, Renslow: Optimizing colormaps with consideration for color vision deficiency to enable
 //! accurate interpretation of scientific data. PLoS ONE 13(7), 2018. Same values as `shaders/colormap.wgsl`.
 
+use serde::Serialize;
+
 /// Base 10 logarithms of the reproduction errors that the first and the last colour of the map represent. Errors are
 /// distances as fractions of the cage's diagonal.
 pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
@@ -39,11 +41,85 @@ pub fn cividis(value: f32) -> [u8; 3] {
     })
 }
 
+/// Legend of the colours of the slice or the model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Legend {
+    low: f32,
+    high: f32,
+    logarithmic: bool,
+    map: ColorMap,
+    /// Largest of the displayed weights; null for other quantities.
+    largest: Option<LargestWeight>,
+}
+
+/// The largest weight, and the index of the model vertex that has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+struct LargestWeight {
+    value: f32,
+    vertex: u32,
+}
+
+/// Colour map that a legend shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+enum ColorMap {
+    Viridis,
+    Error,
+    Kinds,
+}
+
+impl Legend {
+    fn plain(high: f32, map: ColorMap) -> Self {
+        Self { low: 0.0, high, logarithmic: false, map, largest: None }
+    }
+
+    /// Kinds of cells in a slice.
+    #[must_use]
+    pub fn kinds() -> Self {
+        Self::plain(2.0, ColorMap::Kinds)
+    }
+
+    /// Values from 0 to 1.
+    #[must_use]
+    pub fn fractions() -> Self {
+        Self::plain(1.0, ColorMap::Viridis)
+    }
+
+    /// Weights of a control at the model's vertices, up to the largest one or, with `to_one`, up to 1.
+    #[must_use]
+    pub fn weights(weights: impl Iterator<Item = f32>, to_one: bool) -> Self {
+        let numbered = weights.zip(0..).map(|(value, vertex)| LargestWeight { value, vertex });
+        let largest = numbered.max_by(|a, b| a.value.total_cmp(&b.value));
+        let high = largest.filter(|_| !to_one).map_or(1.0, |largest| largest.value.max(MIN_WEIGHT_RANGE));
+        Self { largest, ..Self::plain(high, ColorMap::Viridis) }
+    }
+
+    /// Reproduction errors, see [`ERROR_RANGE`].
+    #[must_use]
+    pub fn errors() -> Self {
+        let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
+        Self { low, logarithmic: true, ..Self::plain(high, ColorMap::Error) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use cagework_core::color::linear_from_byte;
 
     use super::*;
+
+    #[test]
+    fn legend_of_weights_ends_at_the_largest_weight() {
+        let high = |weights: &[f32], to_one| Legend::weights(weights.iter().copied(), to_one).high;
+        let all = [0.25, 0.75, 0.5];
+        assert_eq!([high(&all, false), high(&all, true), high(&[], false)], [0.75, 1.0, 1.0]);
+        assert_eq!(high(&[0.0, -0.1], false), MIN_WEIGHT_RANGE);
+        let largest = Legend::weights(all.into_iter(), true).largest;
+        assert_eq!(largest, Some(LargestWeight { value: 0.75, vertex: 1 }));
+    }
 
     /// Relative luminance of an sRGB colour (IEC 61966-2-1).
     fn luminance(color: [u8; 3]) -> f32 {

@@ -37,7 +37,7 @@ mod splats;
 mod texture;
 mod theme;
 
-pub use camera::{AxisView, Camera, CameraPlace, ImagePoint, Projection, Ray};
+pub use camera::{AxisView, Camera, CameraPlace, CameraView, ImagePoint, Projection, Ray};
 pub(crate) use frame::MAX_SAMPLES;
 pub use frame::{Renderer, Target};
 pub use gizmo::{GIZMO_PX, pick_gizmo};

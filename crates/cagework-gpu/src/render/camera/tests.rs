@@ -293,3 +293,17 @@ fn fitted_points_fill_the_picture() {
         }
     }
 }
+
+#[test]
+fn invalid_views_are_refused_and_valid_ones_restored() {
+    let (mut camera, view) = (Camera::default(), Camera { yaw: 2.0, ..Camera::default() }.view());
+    for wrong in [
+        CameraView { distance: 0.0, ..view },
+        CameraView { pitch: 2.0, ..view },
+        CameraView { target: [f32::NAN; 3], ..view },
+    ] {
+        assert!(!camera.set_view(wrong) && camera == Camera::default(), "{wrong:?}");
+    }
+    assert!(camera.set_view(CameraView { parallel: true, ..view }));
+    assert_eq!((camera.yaw, camera.projection), (2.0, Projection::Orthographic));
+}
