@@ -5,11 +5,14 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 use serde::{Deserialize, Serialize};
 
 /// Axis-aligned bounding box, in object units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Bounds {
     /// Corner with the smallest coordinates.
+    #[cfg_attr(feature = "typescript", ts(type = "[number, number, number]"))]
     pub min: Vec3,
     /// Corner with the largest coordinates.
+    #[cfg_attr(feature = "typescript", ts(type = "[number, number, number]"))]
     pub max: Vec3,
 }
 

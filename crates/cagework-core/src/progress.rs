@@ -21,7 +21,8 @@ pub enum Stage {
 }
 
 /// Progress of a bind or of cage generation, passed to [`Progress::report`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Progress"))]
 pub struct ProgressEvent {
     /// Stage that is in progress.
     pub stage: Stage,

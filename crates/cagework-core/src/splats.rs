@@ -3,6 +3,7 @@
 //! with the rotation in F.
 
 mod harmonics;
+mod outline;
 mod sorted;
 mod stand_in;
 
@@ -14,6 +15,7 @@ use crate::rotation::nearest_rotation;
 use crate::team::map_indices;
 
 pub use harmonics::{MAX_DEGREE, harmonic_basis, n_harmonics, rotate_harmonics};
+pub use outline::{Outline, outlines};
 pub use sorted::{SortedSplats, deform_splats};
 
 /// Length of a splat's half axis at which the error of its first-order deformation is measured, standard deviations: a

@@ -81,6 +81,7 @@ pub enum Severity {
 
 /// Locations of a problem: indices into the checked mesh, and points in object units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Places {
     /// Cage vertices; for [`Code::ModelOutside`] vertices of the model.
     pub vertices: Vec<u32>,
@@ -95,6 +96,7 @@ pub struct Places {
 /// A remedy for a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Fix {
     /// Apply a repair.
     Repair {
@@ -110,6 +112,7 @@ pub enum Fix {
 
 /// All occurrences of one kind of problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Problem {
     /// Kind of the problem.
     pub code: Code,
