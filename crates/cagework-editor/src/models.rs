@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use cagework_core::TriMesh;
 use cagework_core::splats::Splats;
-use cagework_io::{Model, UpAxis};
+use cagework_io::{Clip, Model, UnknownClip, UpAxis};
 use cagework_pose::Parts;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -414,6 +414,24 @@ impl Models {
             first += n;
         }
         Err(EditError::NoModel)
+    }
+
+    /// The geometry that a cage should enclose: positions and triangles of the models at rest, with each morph target, and
+    /// in the frames of `clip` if it is given.
+    ///
+    /// # Errors
+    /// If there is only one model, and it does not have this clip.
+    pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), UnknownClip> {
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for member in self.iter() {
+            // Models without this clip contribute no frames. They stay at rest, or follow the joints of one with it.
+            let has = |name: &&str| self.len() == 1 || Clip::named(&member.model.clips(), name).is_ok();
+            let (own, corners) = member.model.states(clip.filter(has))?;
+            let first = positions.len() as u32;
+            triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
+            positions.extend(own);
+        }
+        Ok((positions, triangles))
     }
 
     /// Parts of all models that stay in place or are rigid.

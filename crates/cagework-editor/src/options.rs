@@ -1,6 +1,7 @@
-//! Editing tools, and the ranges of their radii.
+//! Editing tools and the ranges of their radii; options of exports.
 
 use cagework_core::options::{Number, Slider};
+use cagework_io::{CompactOptions, ReshapeOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::edit::{Element, Pivot};
@@ -27,6 +28,23 @@ impl Default for Tools {
         let (element, pivot) = (Element::default(), Pivot::default());
         Self { element, symmetry: false, pivot, proportional: 0.2, proportional_on: false }
     }
+}
+
+/// How an export treats the rig of a model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RigOptions {
+    /// Options of joints, clips and the ground.
+    #[serde(flatten)]
+    pub reshape: ReshapeOptions,
+    /// Options that reduce the size of the file.
+    #[serde(flatten)]
+    pub size: CompactOptions,
+    /// Whether to export only the shape, without the rig.
+    pub plain: bool,
+    /// Whether the cage deforms the model after a clip has moved it.
+    pub dynamic: bool,
 }
 
 /// Radius of proportional editing.
