@@ -110,11 +110,11 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
       const session = globalThis.cagework;
       if (!session) throw new Error("no session");
       const { engine } = session;
-      const before = { positions: engine.restPositions(), corners: engine.cageCorners() };
+      const before = engine.cageArrays();
       const edited = before.positions.map((x, k) => (k === 1 ? x + 0.01 : x));
       const events: string[] = [];
       const binds = [session.bind(options, ({ kind }) => events.push(kind)), session.bindByFormula("green")];
-      engine.setCage(edited, before.corners, undefined, [], "Edit");
+      engine.setCage({ positions: edited, corners: before.corners }, "Edit");
       const names = binds.map(({ done }) =>
         done.then(
           () => "landed",

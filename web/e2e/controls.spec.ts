@@ -30,7 +30,7 @@ function cage(): Uint8Array {
 }
 
 const controls = (page: Page): Promise<CageControls | undefined> =>
-  page.evaluate(() => globalThis.cagework?.engine.cageControls());
+  page.evaluate(() => globalThis.cagework?.engine.cageArrays().controls);
 
 /** Waits until the model is bound with `smooth` subdivision steps and `inner` interior controls. */
 async function boundTo(page: Page, smooth: number, inner: number): Promise<void> {

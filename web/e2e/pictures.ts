@@ -105,7 +105,7 @@ test("links of the gallery", async ({ page }) => {
         return {
           pose: Array.from(engine.encodePose()),
           camera: { ...view, yaw, pitch, distance: distance * view.distance },
-          controls: engine.cageControls(),
+          controls: engine.cageArrays().controls,
         };
       },
       { index: typeof pose === "number" ? pose : 0, positions, camera, smooth },

@@ -64,7 +64,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
 
   await test.step("all models follow one cage", async () => {
     expect(rest.length / 3).toBe(SIZES.body + SIZES.shirt + SIZES.buckle);
-    const cage = await page.evaluate(() => globalThis.cagework?.engine.cageCorners().length ?? 0);
+    const cage = await page.evaluate(() => globalThis.cagework?.engine.cageArrays().corners.length ?? 0);
     expect(cage).toBeGreaterThan(0);
     await drag(page, 50, -30);
     const moved = apart(await modelPositions(page));

@@ -135,7 +135,7 @@ export async function spot(
     if (!engine || !canvas) return null;
     const { left, top } = canvas.getBoundingClientRect();
     const positions = engine.cagePositions();
-    const list = engine.cageCorners();
+    const list = engine.cageArrays().corners;
     const candidates: number[][] = [];
     for (let k = 0; k < list.length; k += 1 + (list[k] ?? 0)) {
       const face = Array.from(list.slice(k + 1, k + 1 + (list[k] ?? 0)));

@@ -104,13 +104,13 @@ test("without WebGPU the page exports, plays, and recovers from a lost context",
     await page.getByRole("button", { name: "Point", exact: true }).click();
     await page.mouse.click(x, y);
     await expect
-      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageControls()))
+      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageArrays().controls))
       .toMatchObject({ smooth: 2, inner: 1, elements: [{ point: 0 }] });
     await bound(page);
     await shoot(page, "webgl-controls");
     for (const _ of [1, 2]) await page.keyboard.press("Control+z");
     await expect
-      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageControls()))
+      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageArrays().controls))
       .toMatchObject({ smooth: 0, inner: 0 });
     await bound(page);
   });

@@ -5,6 +5,7 @@ import type {
   Element as CageElement,
   ModelInfo,
   PoseView,
+  Problem,
   RigOptions,
   SceneOptions,
 } from "./contract";
@@ -28,6 +29,15 @@ export function rigOf({ model, rigOptions }: AppState): RigOptions {
 /** Whether the cage's faults forbid a bind. */
 export function cageBroken(state: AppState): boolean {
   return state.cage !== null && !state.cage.usable;
+}
+
+/** What a problem card offers: a fix of the check, or to generate another cage. */
+export type Mend = Problem["fixes"][number] | { readonly kind: "regenerate" };
+
+/** The best fix of a problem; undefined for a harmless one. */
+export function mendOf({ code, severity, fixes: [best] }: Problem): Mend | undefined {
+  const needsNewCage = severity === "error" || code === "self_intersection";
+  return best ?? (needsNewCage ? { kind: "regenerate" } : undefined);
 }
 
 /** Scene options as drawn: faults are marked only in step Cage, or if they prevent a bind. */

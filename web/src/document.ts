@@ -1,7 +1,7 @@
 /** Mirrors the document, which Rust stores: updates the keys of the state that show it. */
 
 import { attemptLatest, type Context } from "./actions/context";
-import type { Check, View } from "./contract";
+import type { Problem, View } from "./contract";
 import { SCENE_DEFAULTS } from "./defaults";
 import { cageKey, cageSettings } from "./derived";
 import { follow } from "./queue";
@@ -14,18 +14,18 @@ const KEPT_CHECKS = 32;
 export function followDocument(ctx: Context) {
   const { store, engine } = ctx;
   /** Finished checks, by the `keyOf` of models and cage. */
-  const checks = new Map<string, Check>();
+  const checks = new Map<string, readonly Problem[]>();
   /** Settings with which cages were made, by the key of the cage. */
   const settings = new Map<number, CageSettings>();
   let shown: View | undefined;
   let checking: Promise<unknown> = Promise.resolve();
 
-  const know = (check: Check) => {
+  const know = (check: readonly Problem[]) => {
     ctx.queue.cancel("check");
     checks.set(keyOf(shown), check);
     const [oldest] = checks.keys();
     if (checks.size > KEPT_CHECKS && oldest !== undefined) checks.delete(oldest);
-    engine().showFaults(check.vertices, check.edges, check.faces, check.points, check.outside);
+    engine().showFaults(check);
     store.set({ check });
   };
 

@@ -7,14 +7,12 @@ import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenResult, openOn } from "@cagework/core/session/open";
 import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
-import { polygons } from "@cagework/core/session/reading";
 import type {
   BindEvent,
   BindOptions,
   BindReport,
   CageArrays,
   CageOptions,
-  Check,
   CheckedCage,
   Coordinates,
   GrabInput,
@@ -23,6 +21,7 @@ import type {
   ModelInfo,
   NamedFile,
   OpenContents,
+  Problem,
   PullFrame,
   Repair,
   UpAxis,
@@ -70,11 +69,11 @@ export type ReadFile = Pick<ReadModel, "vertices" | "pixels">;
 export interface OpenedFile {
   readonly model: ModelInfo;
   /** Check of the cage in the file; null without a cage. */
-  readonly check: Check | null;
+  readonly check: readonly Problem[] | null;
   /** Settings of a project, JSON; null for other files. */
   readonly settings: string | null;
   /** Point of a sample that the page asks the user to pull first. */
-  readonly grip?: Float32Array;
+  readonly grip?: readonly number[];
   /** Sentences about parts of a project that could not be restored. */
   readonly notices: readonly string[];
 }
@@ -139,11 +138,7 @@ async function start(opened: OpenResult & Needs) {
   };
   void watch();
 
-  const cage = () => ({
-    positions: engine.restPositions(),
-    corners: engine.cageCorners(),
-    controls: engine.cageControls(),
-  });
+  const cage = () => engine.cageArrays();
 
   const openSeparateWorker = () => createClient(module, openWorker);
   const reading = createSeparateWorkers(openSeparateWorker);
@@ -178,13 +173,7 @@ async function start(opened: OpenResult & Needs) {
     const settings = models[0].settings ?? null;
     // A project that was saved without a cage contains an empty cage.
     const cage = read.cage?.positions.length ? read.cage : undefined;
-    const contents: OpenContents = {
-      sample,
-      settings,
-      cage: cage ? { ...cage, notices: [...(cage.notices ?? [])] } : null,
-      poses,
-    };
-    const notices = await engine.open(models, contents);
+    const notices = await engine.open(models, { sample, settings, cage: cage ?? null, poses });
     const info = engine.modelInfo();
     const model = {
       ...info,
@@ -285,7 +274,7 @@ async function start(opened: OpenResult & Needs) {
     readSettings: pkg.readSettings,
     /** Reads a cage from a file, like a model, and checks it. */
     readCage(files: readonly NamedFile[], hear?: ReadListener): Job<CheckedCage> {
-      const { smooth } = engine.cageControls();
+      const { smooth } = engine.cageArrays().controls;
       const input = {
         files,
         up: engine.up(),
@@ -296,17 +285,15 @@ async function start(opened: OpenResult & Needs) {
       return reading("readCage", input, hear);
     },
     /** Creates a box around the model, with faces of about equal size: `divisions` of them along its longest side. */
-    boxCage: (divisions: number): CageArrays => polygons(engine.boxCage(divisions)),
+    boxCage: (divisions: number): CageArrays => engine.boxCage(divisions),
     /** Checks the cage at rest, in a worker of its own. */
-    checkCage: (): Job<Check> => ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
+    checkCage: (): Job<readonly Problem[]> =>
+      ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
     /** Repairs the cage at rest, in a worker of its own. Cancels `checkCage`. */
     repair: (kind: Repair): Job<CheckedCage> =>
       ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
     /** Sets the cage, as an undo step if there is a label. An invalid cage is kept as a draft, with `usable` false. */
-    takeCage: ({ positions, corners, controls, notices = [] }: CheckedCage, label?: string) =>
-      engine.setCage(positions, corners, controls, [...notices], label),
-    /** Returns the cage at rest, with its interior controls. */
-    cageArrays: cage as () => CageArrays,
+    takeCage: (cage: CageArrays, label?: string) => engine.setCage(cage, label),
     /**
      * Converts poses of `old`, another cage of the model, to poses of the open cage, in the worker.
      * `poses`: `[n_poses, n_old_controls, 3]`.
@@ -323,7 +310,7 @@ async function start(opened: OpenResult & Needs) {
     ): Job<CheckedCage> {
       const input = () => {
         const [positions, triangles] = engine.modelStates(clip);
-        const { smooth } = engine.cageControls();
+        const { smooth } = engine.cageArrays().controls;
         return { positions, triangles, model: engine.modelPositions(), options, smooth };
       };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
@@ -353,11 +340,7 @@ async function start(opened: OpenResult & Needs) {
     loadSlice(axis: 0 | 1 | 2, fraction: number, grid: number): Job<void> {
       const options = { ...BIND_DEFAULTS, grid };
       const job = client.run("slice", { cage: cage(), axis, fraction, options });
-      const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
-      return chain(ofNow(job), (rows) => {
-        const { indptr, indices, data } = rows ?? none;
-        engine.takeSlice(axis, fraction, options, indptr, indices, data);
-      });
+      return chain(ofNow(job), (rows) => engine.takeSlice(axis, fraction, options, rows));
     },
     /**
      * Computes the lattice by which the cage deforms splats and moving models (`RigOptions.dynamic`), in the worker.
@@ -365,9 +348,8 @@ async function start(opened: OpenResult & Needs) {
      */
     loadLattice(grid: number): Job<void> {
       const options = { ...BIND_DEFAULTS, grid };
-      return chain(
-        ofNow(client.run("lattice", { cage: cage(), options })),
-        ({ indptr, indices, data, offsets }) => engine.takeLattice(indptr, indices, data, offsets),
+      return chain(ofNow(client.run("lattice", { cage: cage(), options })), (rows) =>
+        engine.takeLattice(rows),
       );
     },
     /** Prepares pulls of the open model, in a worker for pulls. */

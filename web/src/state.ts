@@ -4,10 +4,10 @@ import type {
   BindOptions,
   BindReport,
   CageState,
-  Check,
   InnerKind,
   Legend,
   ModelInfo,
+  Problem,
   Stage,
   WebGpuFault,
 } from "./contract";
@@ -73,7 +73,7 @@ export const DOCUMENT_STATE = {
   model: null as ModelInfo | null,
   cage: null as CageState | null,
   /** Result of the cage's check; null until it is known. */
-  check: null as Check | null,
+  check: null as readonly Problem[] | null,
   report: null as BindReport | null,
   /** Reports of earlier binds of this cage, for comparison, latest first. */
   earlier: [] as readonly BindReport[],
@@ -99,7 +99,7 @@ export const MODEL_STATE = {
    * Point of the sample that the page asks the user to pull first; null for other models, and once the model has been
    * pulled.
    */
-  grip: null as Float32Array | null,
+  grip: null as readonly number[] | null,
   /** `cageKey` of the settings with which the cage was made or opened. */
   cageMade: cageKey(CAGE_SETTINGS),
   /** Number of vertices of the previewed cage; null without a preview. */

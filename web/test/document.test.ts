@@ -6,20 +6,20 @@ const [FIRST, SECOND] = [cageOf(8, 1), cageOf(12, 2)];
 it("a cage without a check is checked; undoing a change of cage shows the stored check", async () => {
   const { asked, engine, show, store, teach } = createFake();
   const marked: unknown[] = [];
-  teach({ showFaults: (vertices) => marked.push(vertices) });
-  engine.setCage(FIRST.positions, FIRST.corners, undefined, [], undefined);
+  teach({ showFaults: (problems) => marked.push(problems) });
+  engine.setCage(FIRST, undefined);
   expect([store.get().cage?.info.vertices, store.get().check]).toEqual([8, null]);
   await settled();
   await settled();
   asked[0]?.resolve(FIRST.check);
   await settled();
-  engine.setCage(SECOND.positions, SECOND.corners, undefined, [], "Make a cage");
+  engine.setCage(SECOND, "Make a cage");
   expect([store.get().check, store.get().undo]).toEqual([null, "Make a cage"]);
   show({ cage: 1 });
   await settled();
   await settled();
   expect([store.get().check, asked.length]).toEqual([FIRST.check, 1]);
-  expect(marked).toEqual([FIRST.check?.vertices, FIRST.check?.vertices]);
+  expect(marked).toEqual([FIRST.check, FIRST.check]);
 });
 
 it("a cage that comes with its check is not checked again", async () => {

@@ -103,15 +103,7 @@ export const MODEL: ModelInfo = {
 
 /** A checked cage without faults: `n` vertices at x = y = z = `height`, and placeholder corners. */
 export function cageOf(n: number, height = 0): CheckedCage {
-  const check = {
-    problems: [],
-    vertices: new Uint32Array(),
-    edges: new Uint32Array(),
-    faces: new Uint32Array(),
-    points: new Float32Array(),
-    outside: new Uint32Array(),
-  };
-  return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check };
+  return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check: [] };
 }
 
 /** Controls of a cage without smoothing and without interior controls. */
@@ -204,7 +196,6 @@ export function createFake(): Fake {
       edges: 0,
       quads: 0,
       faces: 0,
-      triangles: 0,
       bounds: BOUNDS,
       notices: [...(rest.notices ?? [])],
     },
@@ -231,14 +222,8 @@ export function createFake(): Fake {
     requireCurrent(asked) {
       if (asked !== revision) throw named("Cancelled", "model or cage have changed");
     },
-    setCage(positions, corners, controls, notices, label) {
-      rest = {
-        positions: Float32Array.from(positions),
-        corners: Uint32Array.from(corners),
-        controls,
-        check: null,
-        notices,
-      };
+    setCage(cage, label) {
+      rest = { ...cage, positions: Float32Array.from(cage.positions), check: null };
       posed = rest.positions.slice();
       committed = posed;
       revision += 1;
@@ -266,9 +251,8 @@ export function createFake(): Fake {
     boundReport: () => undefined,
     carriable: () => posed.slice(),
     setEditingRest: (editingRest) => show({ editingRest }),
-    cageControls: controlsNow,
+    cageArrays: () => ({ ...rest, controls: controlsNow() }),
     middleAt: (x, y) => Float32Array.of(x, y, 0),
-    cageCorners: () => rest.corners,
     restPositions: () => rest.positions.slice(),
     cagePositions: () => posed.slice(),
     setCagePositions(positions) {
@@ -303,9 +287,7 @@ export function createFake(): Fake {
     checkCage: () => job("check", null),
     repair: (kind) => job("repair", kind),
     carryPoses: (old, poses) => job<Float32Array>("carry", { old, poses }),
-    takeCage: ({ positions, corners, controls, notices = [] }, label) =>
-      engine.setCage(positions, corners, controls, [...notices], label),
-    cageArrays: () => rest,
+    takeCage: (cage, label) => engine.setCage(cage, label),
     bind: (options, listener) => job("bind", { options, listener }),
     bindByFormula: (kind) => job("formula", kind),
     loadSlice: (axis, position) => job("slice", { axis, position }),
@@ -362,7 +344,7 @@ export function createFake(): Fake {
       show({ models: view.models + 1 });
     },
     showCage(cage) {
-      engine.setCage(cage.positions, cage.corners, cage.controls, [], undefined);
+      engine.setCage(cage, undefined);
       if (cage.check) mirror.know(cage.check);
     },
     teach: (functions) => Object.assign(known, functions),

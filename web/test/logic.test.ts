@@ -166,7 +166,7 @@ describe("the plot", () => {
 it("faults are marked in step Cage, and elsewhere if they prevent a bind", () => {
   const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
   const at = (step: StepName, usable: boolean) => {
-    const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
+    const info = { vertices: 8, edges: 12, faces: 6, quads: 6, bounds, notices: [] };
     const cage = { usable, info, controls: PLAIN_CONTROLS, radius: 0 };
     return drawn({ ...INITIAL_STATE, step, cage }).problems;
   };

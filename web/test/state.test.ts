@@ -26,7 +26,7 @@ describe("store", () => {
 });
 
 it("the cue at the sample is shown when pulls are ready, until the first pull, and again when it is undone", () => {
-  const bound = { ...INITIAL_STATE, grip: new Float32Array([0, 1, 0]), bound: true };
+  const bound = { ...INITIAL_STATE, grip: [0, 1, 0], bound: true };
   const opened = { ...bound, pullReady: true };
   const pulled = { ...opened, posed: true, undo: "Pull" };
   const states: AppState[] = [

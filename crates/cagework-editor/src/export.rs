@@ -65,7 +65,7 @@ impl BoundDocument<'_> {
         let body = body.ok_or(BoundError::Missing { what: "skeleton", how: "open a model that has one" })?;
         let moved = MovedModel::new(self, body.id)?;
         clips.set_up(models.up());
-        clips.see_from(models.origin());
+        clips.set_origin(models.origin());
         let skeleton = moved.model.skeleton(&moved.by(pose)?, &moved.outside, &options)?;
         let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
         let by = vec![DVec3::ZERO; clips.extra_points()?.len()];
@@ -161,7 +161,7 @@ impl BoundDocument<'_> {
         let options = self.of_rig(pose, request)?;
         let member = self.document().models.get(id)?;
         let mut posed = member.share(&self.deformed(pose)?).to_vec();
-        member.model.stand(&mut posed, &options);
+        member.model.lift(&mut posed, &options);
         Ok(Exported { bytes: member.model.write_glb(&posed)?, notices: Vec::new() })
     }
 

@@ -191,7 +191,7 @@ impl Editor {
 }
 
 impl BoundDocument<'_> {
-    /// Returns the weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle,
+    /// Returns the weights of the bind at a grab, `[n_columns]`, and the nearest corner of the grabbed triangle,
     /// or [`CAGE_SEED`] for a grabbed cage vertex. `None` before a bind, or if the triangle or the vertex does not exist.
     #[must_use]
     pub fn grip_of(&self, grab: Grab) -> Option<(Vec<f64>, u32)> {
@@ -199,13 +199,13 @@ impl BoundDocument<'_> {
         let point = match grab {
             Grab::Surface(point) => point,
             Grab::Vertex(vertex) => {
-                let mut row = vec![0.0; self.document().pose.len()];
-                *row.get_mut(vertex as usize)? = 1.0;
+                let mut row = vec![0.0; bound.weights.n_columns()];
+                *row[..self.document().pose.len()].get_mut(vertex as usize)? = 1.0;
                 return Some((row, CAGE_SEED));
             }
         };
         let corners = self.document().models.corners(point.triangle)?;
-        let rows = bound.frames.folded(&bound.weights.with_rows(&corners));
+        let rows = bound.weights.with_rows(&corners);
         let mut row = vec![0.0; rows.n_columns()];
         for (k, share) in point.bary.into_iter().enumerate() {
             let (columns, values) = rows.row(k);

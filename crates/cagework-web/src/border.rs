@@ -6,25 +6,29 @@ use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write as _;
 use std::fs;
 
+use cagework_cage::check::Problem;
 use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, HULL_TARGET};
-use cagework_core::Coordinates;
 use cagework_core::options::Choice;
 use cagework_core::report::BindReport;
-use cagework_editor::Command;
+use cagework_core::{Coordinates, ProgressEvent};
 use cagework_editor::edit::{GestureView, SelectMode};
-use cagework_gpu::render::GizmoPart;
+use cagework_editor::{
+    CageState, Command, ModelInfo, NUMBERS, PageBindOptions, RigOptions, Settings, fields,
+};
+use cagework_gpu::render::colormap::Legend;
+use cagework_gpu::render::{CameraView, GizmoPart};
 use cagework_io::{FormatFacts, ModelFormat};
 use cagework_pose::pull::DragOptions;
 use serde_json::Value;
 use ts_rs::{Config, TS, TypeVisitor};
 
-use crate::binder::Offsets;
-use crate::clock::Event;
+use crate::binder::BuiltSample;
 use crate::error::ErrorName;
 use crate::opening::OpenContents;
-use crate::options::{JsBindOptions, JsRigOptions, JsSceneOptions, fields};
-use crate::settings::{NUMBERS, Settings};
-use crate::views::{CageState, CameraView, Legend, ModelInfo, Problem, View};
+use crate::options::JsSceneOptions;
+use crate::puller::{GrabInput, GrabResult, PullFrame};
+use crate::views::View;
+use crate::weights::BoundArrays;
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
@@ -64,8 +68,9 @@ fn generated_types_are_up_to_date() {
     let config = Config::default().with_large_int("number");
     let mut found = Declarations { config, seen: HashSet::new(), found: BTreeMap::new() };
     found.visit::<ErrorName>();
-    found.visit::<Event>();
-    found.visit::<Offsets>();
+    found.visit::<ProgressEvent>();
+    found.visit::<BoundArrays>();
+    found.visit::<BuiltSample>();
     found.visit::<BindReport>();
     found.visit::<CageState>();
     found.visit::<Problem>();
@@ -77,6 +82,9 @@ fn generated_types_are_up_to_date() {
     found.visit::<JsSceneOptions>();
     found.visit::<CameraView>();
     found.visit::<DragOptions>();
+    found.visit::<GrabInput>();
+    found.visit::<GrabResult>();
+    found.visit::<PullFrame>();
     found.visit::<Legend>();
     found.visit::<SelectMode>();
     found.visit::<GestureView>();
@@ -86,9 +94,9 @@ fn generated_types_are_up_to_date() {
         "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n{}",
         declarations.replace(" \n", "\n")
     );
-    text += &constant("BIND_DEFAULTS", "BindOptions", fields(&JsBindOptions::default()));
+    text += &constant("BIND_DEFAULTS", "BindOptions", fields(&PageBindOptions::default()));
     text += &constant("CAGE_DEFAULTS", "CageOptions", fields(&CageOptions::default()));
-    text += &constant("RIG_DEFAULTS", "RigOptions", fields(&JsRigOptions::default()));
+    text += &constant("RIG_DEFAULTS", "RigOptions", fields(&RigOptions::default()));
     text += &constant("VIEW_DEFAULTS", "View", fields(&View::default()));
     text += &constant("SCENE_DEFAULTS", "SceneOptions", fields(&JsSceneOptions::default()));
     let kinds: Vec<&str> = Coordinates::ALL.iter().map(|(word, _)| *word).collect();

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 
 use cagework_core::{Progress, ProgressEvent};
 use js_sys::Function;
-use serde::Serialize;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -40,22 +39,10 @@ impl Drop for Listener {
     }
 }
 
-/// A [`ProgressEvent`] as JavaScript receives it.
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS), ts(rename = "Progress"))]
-pub(crate) struct Event {
-    stage: cagework_core::Stage,
-    fraction: f32,
-    iteration: u32,
-    delta: Option<f32>,
-}
-
 impl Progress for Listener {
     fn report(&self, event: ProgressEvent) -> ControlFlow<()> {
-        let ProgressEvent { stage, fraction, iteration, delta } = event;
         let Some(listener) = LISTENER.with_borrow(Clone::clone) else { return ControlFlow::Continue(()) };
-        let event = object(&Event { stage, fraction, iteration, delta });
-        match listener.call1(&JsValue::NULL, &event) {
+        match listener.call1(&JsValue::NULL, &object(&event)) {
             Ok(answer) if answer == JsValue::FALSE => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),
             // The callback threw: cancel the job.

@@ -8,7 +8,7 @@ use cagework_core::cage::CageError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, ClosedFormError, ControlError};
-use cagework_editor::EditError;
+use cagework_editor::{BoundError, EditError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
 use cagework_pose::pull::PullError;
@@ -51,7 +51,7 @@ pub(crate) enum ErrorName {
 
 /// Name and message of an error. JavaScript receives it as an `Error`.
 #[derive(Debug)]
-pub(crate) struct Fault {
+pub struct Fault {
     name: ErrorName,
     message: String,
 }
@@ -133,6 +133,17 @@ impl From<EditError> for Fault {
     fn from(error: EditError) -> Self {
         let is_missing = matches!(error, EditError::NoModel | EditError::NoCage);
         Self::new(if is_missing { ErrorName::Missing } else { ErrorName::Error }, error)
+    }
+}
+
+impl From<BoundError> for Fault {
+    fn from(error: BoundError) -> Self {
+        match error {
+            BoundError::Missing { .. } => Self::new(ErrorName::Missing, error),
+            BoundError::Edit(error) => error.into(),
+            BoundError::Read(error) => error.into(),
+            _ => Self::new(ErrorName::Error, error),
+        }
     }
 }
 

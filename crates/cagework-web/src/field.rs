@@ -7,10 +7,10 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, points, pose};
-use crate::binder::Offsets;
-use crate::controls::control_set;
-use crate::error::{ErrorName, Fault};
+use crate::cage::control_set;
+use crate::error::{Answer, ErrorName, Fault};
 use crate::options::decode;
+use crate::weights::BoundArrays;
 
 /// The displacement field of a posed cage, on a lattice around the cage. It moves any points within the lattice, not
 /// only the vertices of a bound model.
@@ -29,25 +29,18 @@ impl FieldMap {
     /// # Errors
     /// If the arrays do not match.
     #[wasm_bindgen(constructor)]
-    #[expect(clippy::too_many_arguments, reason = "arrays of a cage and of a bind")]
     pub fn new(
-        cage: &[f32],
-        corners: &[u32],
-        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
         cells: u32,
-        indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
-        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
-    ) -> Result<Self, JsValue> {
-        let set = control_set(cage, corners, controls)?;
+        #[wasm_bindgen(unchecked_param_type = "BoundArrays")] rows: JsValue,
+    ) -> Answer<Self> {
+        let set = control_set(cage)?;
         let controls = Controls::from(&set);
-        let (weights, frames) =
-            decode::<Offsets>(offsets)?.bound(controls.n_controls(), indptr, indices, data)?;
+        let (weights, frames) = decode::<BoundArrays>(rows)?.bound(controls.n_controls())?;
         let lattice = Lattice::new(controls.surface(), cells);
         if weights.n_rows() != lattice.points().len() {
             let message = format!("the lattice of {cells} cells has {} points", lattice.points().len());
-            return Err(Fault::new(ErrorName::Error, message).into());
+            return Err(Fault::new(ErrorName::Error, message));
         }
         let (weights, rest) = (FieldWeights::new(lattice, weights, frames), controls.rest().to_vec());
         let field = weights.pose(&rest, &rest);
@@ -58,7 +51,7 @@ impl FieldMap {
     ///
     /// # Errors
     /// If the pose has another number of points.
-    pub fn pose(&mut self, posed: &[f32]) -> Result<(), JsValue> {
+    pub fn pose(&mut self, posed: &[f32]) -> Answer<()> {
         self.field = self.weights.pose(&self.rest, &pose(posed, self.rest.len())?);
         Ok(())
     }

@@ -76,12 +76,12 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 state.borrow_mut().on_gpu.cage = Some(key.cage);
             }
             Upload::Weights => {
-                let Some(bound) = state.borrow_mut().cache.get(key).cloned() else { continue };
-                let (weights, frames) = (Arc::clone(&bound.weights), Arc::clone(&bound.frames));
+                let Some(cached) = state.borrow_mut().cache.get(key).cloned() else { continue };
+                let (weights, frames) = (Arc::clone(&cached.0.weights), Arc::clone(&cached.0.frames));
                 gpu.main.adopt(weights, frames).await?;
                 let mut state = state.borrow_mut();
                 if state.editor.key() == key {
-                    state.set_bound(bound);
+                    state.set_bound(cached);
                 }
             }
             Upload::Parts => {

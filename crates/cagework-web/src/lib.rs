@@ -15,40 +15,37 @@ mod arrays;
 pub mod binder;
 #[cfg(test)]
 mod border;
+mod cage;
 mod clock;
-mod controls;
 #[cfg(target_family = "wasm")]
 pub mod engine;
 mod error;
 mod field;
 #[cfg(target_family = "wasm")]
 mod gpu;
-mod held;
 mod incoming;
-mod joints;
 pub mod loaded;
 mod opening;
-mod options;
-mod outlines;
-mod playing;
+pub mod options;
 mod problems;
 pub mod puller;
 pub mod reshape;
 mod scene;
-pub mod settings;
 mod state;
 #[cfg(target_family = "wasm")]
 mod surface;
 mod views;
+mod weights;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// TypeScript types that the `unchecked_*_type` attributes name; `border.rs` writes their declarations.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, DragOptions, Gesture,
-  GizmoPart, Legend, ModelFormat, ModelInfo, OpenContents, Problem, Progress, Repair, RigOptions,
-  SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis, View } from "../contract/generated";
+import type { BindOptions, BindReport, BoundArrays, BuiltSample, CageArrays, CageControls, CageOptions, CageState, Command,
+  Coordinates, Frames, Gesture, GizmoPart, GrabInput, GrabResult, Legend, ModelFormat, ModelInfo, Offsets, OpenContents,
+  Problem, Progress, PullFrame, Repair, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
+  View } from "../contract/generated";
 
 /** Column indices and weights from `start` to `end` of sparse rows. */
 export type WeightRows = (start: number, end: number) => Rows | Promise<Rows>;

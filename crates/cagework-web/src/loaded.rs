@@ -16,9 +16,10 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast as _, JsValue};
 
 use crate::arrays::flat;
-use crate::binder::Polygons;
+use crate::cage::CageArrays;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{READ_LIMIT, decode};
+use crate::views::{object, optional};
 
 /// The bytes of a file, copied into wasm memory in chunks, so that JavaScript never holds the whole file.
 #[wasm_bindgen]
@@ -64,8 +65,8 @@ impl LoadedModel {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Result<LoadedModel, JsValue> {
-        Ok(Self::from_bytes(name, bytes.0, sibling)?)
+    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Answer<LoadedModel> {
+        Self::from_bytes(name, bytes.0, sibling)
     }
 
     /// Reads materials and textures of all models of the file; call it before [`Self::take_next`]. It is separate from
@@ -89,10 +90,7 @@ impl LoadedModel {
     /// # Errors
     /// If `up` is not an up axis.
     #[wasm_bindgen(js_name = setUp)]
-    pub fn set_up(
-        &mut self,
-        #[wasm_bindgen(unchecked_param_type = "UpAxis")] up: JsValue,
-    ) -> Result<(), JsValue> {
+    pub fn set_up(&mut self, #[wasm_bindgen(unchecked_param_type = "UpAxis")] up: JsValue) -> Answer<()> {
         self.turn_to(decode(up)?);
         Ok(())
     }
@@ -108,14 +106,14 @@ impl LoadedModel {
     /// # Errors
     /// If `origin` is not three numbers, or is too far from the model.
     #[wasm_bindgen(js_name = seeFrom)]
-    pub fn see_from(&mut self, origin: &[f64]) -> Result<(), JsValue> {
+    pub fn see_from(&mut self, origin: &[f64]) -> Answer<()> {
         let origin: [f64; 3] =
             origin.try_into().map_err(|_| Fault::new(ErrorName::Error, "origin must be three numbers"))?;
         self.model.set_origin(DVec3::from_array(origin));
         if self.model.positions.iter().all(|p| p.is_finite()) {
             return Ok(());
         }
-        Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
+        Err(Fault::new(ErrorName::Error, "origin is too far from the model"))
     }
 
     /// Gives these clothes the joints, joint weights and morph targets of `body`. Returns what was copied, as an English
@@ -124,7 +122,7 @@ impl LoadedModel {
     /// # Errors
     /// Those of `Model::with_skin_of`; the clothes are then unchanged.
     #[wasm_bindgen(js_name = takeSkinOf)]
-    pub fn take_skin_of(&mut self, body: &LoadedModel) -> Result<String, JsValue> {
+    pub fn take_skin_of(&mut self, body: &LoadedModel) -> Answer<String> {
         let taken = self.model.with_skin_of(&body.model, READ_LIMIT);
         let (model, found) = taken.map_err(|e| Fault::new(ErrorName::Error, e))?;
         self.model = model;
@@ -148,11 +146,10 @@ impl LoadedModel {
     /// Rebuilds a model from the arrays of [`Self::store`].
     ///
     /// # Errors If the arrays are not from [`Self::store`].
-    pub fn restore(arrays: Vec<Uint8Array>) -> Result<LoadedModel, JsValue> {
+    pub fn restore(arrays: Vec<Uint8Array>) -> Answer<LoadedModel> {
         let mut arrays = arrays.into_iter();
         let mut next = || arrays.next().map(|array| array.to_vec());
-        Ok(Self::restored(&mut StoredArrays(&mut next))
-            .map_err(|error| Fault::new(ErrorName::Error, error.to_string()))?)
+        Self::restored(&mut StoredArrays(&mut next)).map_err(|error| Fault::new(ErrorName::Error, error))
     }
 
     /// Keeps the compressed file that the model was decoded from, so that an undeformed model is exported in that form.
@@ -184,18 +181,18 @@ impl LoadedModel {
     }
 
     /// The cage of a project; undefined for other files.
-    #[wasm_bindgen(getter)]
-    pub fn cage(&self) -> Option<Polygons> {
-        self.cage.clone().map(|mesh| {
-            let (cage, _) = self.document_settings().cage(&mesh);
-            Polygons { controls: cage.map(|cage| cage.controls), ..mesh.into() }
-        })
+    #[wasm_bindgen(getter, unchecked_return_type = "CageArrays | undefined")]
+    pub fn cage(&self) -> JsValue {
+        optional(self.cage.as_ref().map(|mesh| {
+            let (cage, _) = self.document_settings().cage(mesh);
+            CageArrays { controls: cage.map(|cage| cage.controls), ..CageArrays::of(mesh) }
+        }))
     }
 
     /// The mesh of the model, used as a cage.
-    #[wasm_bindgen(js_name = asCage)]
-    pub fn as_cage(&self) -> Polygons {
-        self.model.cage_mesh().into()
+    #[wasm_bindgen(js_name = asCage, unchecked_return_type = "CageArrays")]
+    pub fn as_cage(&self) -> JsValue {
+        object(&CageArrays::of(&self.model.cage_mesh()))
     }
 
     /// Number of textures to decode.

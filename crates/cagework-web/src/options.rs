@@ -1,54 +1,38 @@
 //! Options as JavaScript passes them; border.rs generates their TypeScript declarations.
 
+use cagework_core::Coordinates;
 use cagework_core::options::{Backend, Solver};
-use cagework_core::{BindOptions, Coordinates};
+use cagework_editor::{PageBindOptions, Settings};
 use cagework_gpu::render::{GizmoMode, ViewOptions};
-use cagework_io::{CompactOptions, Joints, ReshapeOptions, value_fault};
+use cagework_io::{Joints, value_fault};
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::error::{Answer, ErrorName, Fault};
+use crate::views::object;
 
 /// Memory limit for reading a file, and for closed-form coordinates, bytes. It is a quarter of the 4 GiB that a tab can
 /// use, because drawing and binding need memory too.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
-/// Default memory limit of a bind in the page, bytes: half of the 4 GiB that a browser tab can address.
-const BIND_LIMIT: u64 = 2 << 30;
-
-/// Options of a bind, and the processor that it runs on.
-#[derive(Clone, Copy, Deserialize, Serialize)]
-#[serde(default)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "BindOptions"))]
-pub(crate) struct JsBindOptions {
-    pub(crate) backend: Backend,
-    #[serde(flatten)]
-    pub(crate) options: BindOptions,
+/// Whether a bind runs on the CPU: because the options say so, the build has no WebGPU, or the solver has no GPU version.
+pub(crate) fn is_on_cpu(request: &PageBindOptions) -> bool {
+    request.backend == Backend::Cpu
+        || request.options.solver == Solver::ConjugateGradient
+        || !cfg!(feature = "webgpu")
 }
 
-impl Default for JsBindOptions {
-    fn default() -> Self {
-        let options = BindOptions { memory_limit: BIND_LIMIT, ..BindOptions::default() };
-        Self { backend: Backend::Gpu, options }
-    }
-}
-
-impl JsBindOptions {
-    /// Whether the bind runs on the CPU: because the options say so, the build has no WebGPU, or the solver has no GPU
-    /// version.
-    pub(crate) fn is_on_cpu(&self) -> bool {
-        self.backend == Backend::Cpu
-            || self.options.solver == Solver::ConjugateGradient
-            || !cfg!(feature = "webgpu")
-    }
+/// Reads the settings of a project, see [`Settings::read`].
+#[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
+pub fn read_settings(text: &str, memory_limit: f64) -> JsValue {
+    object(&Settings::read(text, memory_limit as u64))
 }
 
 /// Elements of the scene that are drawn, and their colours.
 #[derive(Clone, Deserialize, PartialEq, Eq)]
-#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
 pub(crate) struct JsSceneOptions {
     #[serde(flatten)]
@@ -90,7 +74,7 @@ impl Default for JsSceneOptions {
 /// What the colours of the model show: its materials, plain clay, weights, or errors.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) enum Colour {
     Material,
     Clay,
@@ -101,38 +85,11 @@ pub(crate) enum Colour {
 /// What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) enum SliceContent {
     Off,
     Kinds,
     Value,
-}
-
-/// How an export treats the rig of a model.
-#[derive(Clone, Default, Deserialize, PartialEq, Serialize)]
-#[serde(default)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "RigOptions"))]
-pub(crate) struct JsRigOptions {
-    #[serde(flatten)]
-    pub(crate) reshape: ReshapeOptions,
-    /// Options that reduce the size of the file.
-    #[serde(flatten)]
-    pub(crate) size: CompactOptions,
-    /// Whether to export only the shape, without the rig.
-    pub(crate) plain: bool,
-    /// Whether the cage deforms the model after a clip has moved it.
-    pub(crate) dynamic: bool,
-}
-
-/// Fields of options as JSON, without `threads` and `smooth`, which JavaScript does not set.
-pub(crate) fn fields(options: &impl Serialize) -> Map<String, Value> {
-    // Text keeps the digits of an `f32`; `serde_json::to_value` would widen it to `f64`.
-    let text = serde_json::to_string(options).unwrap_or_default();
-    let mut fields: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
-    // The page binds with one thread, and smoothing is a property of the cage.
-    fields.retain(|name, _| name != "threads" && name != "smooth");
-    fields
 }
 
 /// Decodes a JavaScript value to a Rust type.

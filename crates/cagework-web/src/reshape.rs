@@ -4,6 +4,7 @@ use cagework_core::deform::{deform_finite, displacements};
 use cagework_core::field::{CELLS, FieldWeights, Lattice};
 use cagework_core::options::OutsidePolicy;
 use cagework_core::{Binding, Controls, Frames, Weights};
+use cagework_editor::{PageBindOptions, RigOptions};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, compact};
 use cagework_pose::Parts;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
@@ -11,11 +12,12 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, pose};
-use crate::binder::{Binder, Offsets};
-use crate::controls::control_set;
+use crate::binder::Binder;
+use crate::cage::control_set;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::loaded::LoadedModel;
-use crate::options::{JsBindOptions, JsRigOptions, decode};
+use crate::options::decode;
+use crate::weights::BoundArrays;
 
 #[wasm_bindgen]
 impl LoadedModel {
@@ -32,7 +34,7 @@ impl LoadedModel {
     /// If the model has no clip with this name.
     #[wasm_bindgen(unchecked_return_type = "[Float32Array, Uint32Array]")]
     #[allow(clippy::needless_pass_by_value, reason = "wasm-bindgen passes optional strings by value")]
-    pub fn states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
+    pub fn states(&self, clip: Option<String>) -> Answer<JsValue> {
         let states = self.model.states(clip.as_deref());
         let (positions, triangles) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
         let positions = Float32Array::from(flat(&positions).as_slice());
@@ -49,28 +51,25 @@ impl Binder {
     ///
     /// # Errors
     /// If the bind fails, the pose does not have `n_controls` points, or the deformed file cannot be written.
-    #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn reshape(
         &self,
         loaded: &LoadedModel,
-        cage: Vec<f32>,
-        corners: Vec<u32>,
-        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
         posed: Vec<f32>,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] rig: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-    ) -> Result<Vec<u8>, JsValue> {
-        let (model, rig): (&Model, JsRigOptions) = (&loaded.model, decode(rig)?);
-        let set = control_set(&cage, &corners, controls)?;
+    ) -> Answer<Vec<u8>> {
+        let (model, rig): (&Model, RigOptions) = (&loaded.model, decode(rig)?);
+        let set = control_set(cage)?;
         let rest = Controls::from(&set).rest().to_vec();
         let posed = pose(&posed, rest.len())?;
         let keeps_rig = model.is_rigged() && !rig.plain;
         let of_rig = of_model(model, &rig)?;
         rig.size.require(model.format()).map_err(|e| Fault::new(ErrorName::Error, e))?;
-        let extra = if keeps_rig { model.extra_points().map_err(Fault::from)? } else { Vec::new() };
+        let extra = if keeps_rig { model.extra_points()? } else { Vec::new() };
         let at = [model.positions.as_slice(), &extra].concat();
-        let mut request: JsBindOptions = decode(options)?;
+        let mut request: PageBindOptions = decode(options)?;
         request.options.extra_points = extra.len();
         // Count the memory for writing the file against the limit, so that a lack of memory is reported before the
         // bind.
@@ -81,25 +80,25 @@ impl Binder {
             let Binding { weights, frames, .. } =
                 self.run(&lattice.points(), &set, request, progress).await?;
             let field = FieldWeights::new(lattice, weights, frames).pose(&rest, &posed);
-            let written = model.write_in_field(model.format(), &field).map_err(Fault::from)?;
-            return Ok(compact(written, rig.size).map_err(Fault::from)?);
+            let written = model.write_in_field(model.format(), &field)?;
+            return Ok(compact(written, rig.size)?);
         }
         let bound = self.run(&at, &set, request, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
             let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
-            let written = model.write_reshaped(&by, &outside, &[], &of_rig).map_err(Fault::from)?;
-            return Ok(compact(written.0, rig.size).map_err(Fault::from)?);
+            let written = model.write_reshaped(&by, &outside, &[], &of_rig)?;
+            return Ok(compact(written.0, rig.size)?);
         }
         let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig);
-        let written = model.write(model.format(), &deformed).map_err(Fault::from)?;
-        Ok(compact(written, rig.size).map_err(Fault::from)?)
+        let written = model.write(model.format(), &deformed)?;
+        Ok(compact(written, rig.size)?)
     }
 }
 
 /// Prepares the export options of a model. Splits the names of rigid parts into attachments of the skeleton and other
 /// parts.
-fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
+fn of_model(model: &Model, rig: &RigOptions) -> Answer<ReshapeOptions> {
     let options = rig.reshape.clone();
     let props = if rig.plain { Vec::new() } else { model.props()? };
     let (rigid, others): (Vec<_>, Vec<_>) = options.rigid.into_iter().partition(|name| props.contains(name));
@@ -121,20 +120,17 @@ pub struct Deformer {
 
 #[wasm_bindgen]
 impl Deformer {
-    /// Creates a deformer from the arrays of a `BindResult` with `n_controls` controls.
+    /// Creates a deformer from weights for `n_controls` controls.
     ///
     /// # Errors
     /// If the arrays do not match each other or `n_controls`.
     #[wasm_bindgen(constructor)]
     pub fn new(
         n_controls: u32,
-        indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
-        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
-    ) -> Result<Self, JsValue> {
+        #[wasm_bindgen(unchecked_param_type = "BoundArrays")] rows: JsValue,
+    ) -> Answer<Self> {
         let n_controls = n_controls as usize;
-        let (weights, frames) = decode::<Offsets>(offsets)?.bound(n_controls, indptr, indices, data)?;
+        let (weights, frames) = decode::<BoundArrays>(rows)?.bound(n_controls)?;
         Ok(Self { n_controls, weights, frames })
     }
 
@@ -142,7 +138,7 @@ impl Deformer {
     ///
     /// # Errors
     /// If the pose does not have `n_controls` points, or moves a point beyond the range of 32-bit floats.
-    pub fn deform(&self, posed: &[f32]) -> Result<Vec<f32>, JsValue> {
+    pub fn deform(&self, posed: &[f32]) -> Answer<Vec<f32>> {
         let posed = pose(posed, self.n_controls)?;
         let points = deform_finite(&self.weights, &self.frames, &posed);
         Ok(flat(&points.map_err(|e| Fault::new(ErrorName::Error, e))?))

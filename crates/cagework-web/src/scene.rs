@@ -9,7 +9,8 @@ use cagework_io::Joints;
 use glam::{Quat, Vec3};
 
 use crate::options::{Colour, SliceContent};
-use crate::state::State;
+use crate::problems;
+use crate::state::{GrabState, State};
 
 impl State {
     /// Style of the mesh. Colours of weights and errors need a bind; colours of weights also need a
@@ -144,7 +145,20 @@ impl State {
         if !self.view.problems {
             return Marks::default();
         }
-        self.faults.marks(self.rest(), self.pose(), self.set().is_none())
+        problems::marks(&self.faults, self.rest(), self.pose(), self.set().is_none())
+    }
+
+    /// Creates the marks of grabs, pins and of an interior control that is being placed. Before a bind, grabs and pins
+    /// are omitted.
+    fn held_marks(&self) -> Marks {
+        let GrabState { points, target, placed, .. } = &self.held;
+        let held = [points, &*self.editor.document().pins].concat();
+        let mut points = self.bound_document().followed(&held);
+        let line = target.zip(points.first()).map(|(to, from)| [*from, to]);
+        let placing = placed.windows(2).map(|pair| [pair[0], pair[1]]);
+        let segments = line.into_iter().chain(placing).collect();
+        points.extend(placed);
+        Marks { points, segments, ..Marks::default() }
     }
 
     /// Creates the marks of joints: dots for those inside the cage, rings for those outside; empty before a bind.

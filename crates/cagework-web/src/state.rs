@@ -2,27 +2,27 @@
 //! changes to the GPU.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::sync::Arc;
 
-use cagework_core::deform::{OutsideVertex, deform_bound};
-use cagework_core::enclosure::Enclosure;
-use cagework_core::field::{Field, FieldWeights};
+use cagework_cage::check::Problem;
+use cagework_core::field::FieldWeights;
 use cagework_core::slice::Slice;
-use cagework_core::{Bounds, ControlSet, Coordinates, Frames, PolygonMesh, Weights};
-use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
+use cagework_core::{Bounds, ControlSet, Coordinates, PolygonMesh};
+use cagework_editor::{
+    BoundDocument, BoundModels, Cache, CageWatch, Editor, Key, KnownGround, Models, Playback, PosedModels,
+    RestCage, RigOptions, SurfacePoint,
+};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, CameraPlace, DrawModel, GizmoPart};
-use cagework_io::{Ground, UpAxis};
+use cagework_io::UpAxis;
 use cagework_pose::parts::BoundParts;
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
-use crate::joints::JointDots;
-use crate::options::{JsRigOptions, JsSceneOptions};
-use crate::playing::Playback;
-use crate::problems::Faults;
-use crate::views::{CageInfo, CageState, View};
+use crate::options::JsSceneOptions;
+use crate::views::View;
 
 /// The editor's document, the camera, and derived data.
 #[derive(Default)]
@@ -36,21 +36,21 @@ pub(crate) struct State {
     /// `[n_vertices]`
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
     /// Faults of the cage that the last check found.
-    pub(crate) faults: Faults,
-    /// The cage without interior controls, and a sample of the models' vertices that is tested against it while the
-    /// user reshapes the cage; computed on first use.
-    pub(crate) watched: Option<(ControlSet, Enclosure)>,
+    pub(crate) faults: Vec<Problem>,
+    /// Finds vertices outside while the user reshapes the cage; computed on first use.
+    pub(crate) watch: Option<CageWatch>,
     /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
+    /// Report of the bind, as JavaScript receives it.
+    pub(crate) report: Rc<JsValue>,
     /// Parts of the models that stay in place or are rigid, prepared for the current weights. `None` if all vertices
     /// follow the cage.
     parts: Option<BoundParts>,
     /// Cached weights for documents in the history.
-    pub(crate) cache: Cache<Arc<BoundModels>>,
+    pub(crate) cache: Cache<(Arc<BoundModels>, Rc<JsValue>)>,
     /// Notices from the last export: changes of the rig, and data that the file format loses.
     pub(crate) rig_notices: Vec<String>,
-    /// Lowest points of several models in the current pose, cached with the weights and options of their computation.
-    pub(crate) ground: Option<(Arc<BoundModels>, JsRigOptions, Ground)>,
+    ground: KnownGround,
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
     /// Weights on a lattice around the cage. They deform splats, and models that a clip moves.
@@ -92,21 +92,6 @@ pub(crate) struct State {
     pub(crate) is_changed: bool,
     /// Error of an upload, which the next frame reports.
     pub(crate) fault: Option<Fault>,
-}
-
-/// Weights of all models in a cage.
-pub(crate) struct BoundModels {
-    pub(crate) weights: Arc<Weights>,
-    pub(crate) frames: Arc<Frames>,
-    /// Weights of the points of the models' rigs.
-    pub(crate) rig: Option<Weights>,
-    /// Vertices outside the cage, then points of rigs outside the cage. The indices of rig points start after the last
-    /// vertex.
-    pub(crate) outside: Vec<OutsideVertex>,
-    /// Joints of the rigs; `None` if a rig cannot be read.
-    pub(crate) joints: Option<JointDots>,
-    /// Report of the bind, as JavaScript receives it.
-    pub(crate) report: JsValue,
 }
 
 /// Keys and pose of the document that the derived data belongs to.
@@ -184,13 +169,13 @@ impl State {
             std::mem::replace(&mut self.derived, DerivedKeys { key, models, pose: Arc::clone(&pose) });
         if key != before {
             self.revision += 1;
-            self.watched = None;
+            self.watch = None;
             self.active_part = None;
             (self.slice, self.lattice, self.playing) = (None, None, None);
             self.floaters.clear();
             self.held = GrabState::default();
             self.others.clear();
-            self.faults = Faults::default();
+            self.faults.clear();
             self.draft.clear();
             (self.bound, self.parts) = (None, None);
             if key.mesh != before.mesh {
@@ -205,7 +190,7 @@ impl State {
             self.is_changed = true;
         }
         if key != before || models != models_before || !Arc::ptr_eq(&pose, &pose_before) {
-            self.ground = None;
+            self.ground.take();
         }
         if key != before || !Arc::ptr_eq(&pose, &pose_before) {
             // Write the scene too: it contains the gizmo and the marks, whose positions depend on the pose.
@@ -302,16 +287,6 @@ impl State {
         self.is_changed = true;
     }
 
-    /// Collects the properties of the cage, for panels; `None` without a cage.
-    pub(crate) fn cage_state(&self) -> Option<CageState> {
-        (!self.rest().faces.is_empty()).then(|| CageState {
-            usable: self.set().is_some(),
-            info: CageInfo::of(self.cage()),
-            controls: self.cage().controls.clone(),
-            radius: self.cage().radius(),
-        })
-    }
-
     /// Collects document and bind state for the page's panels.
     pub(crate) fn document_view(&self) -> View {
         View {
@@ -322,9 +297,10 @@ impl State {
         }
     }
 
-    /// Uses `bound` as the weights of the current document, and ends the playback of a clip.
-    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
-        self.bound = Some(bound);
+    /// Uses `bound` as the weights of the current document, with the report of their bind, and ends the playback of a
+    /// clip.
+    pub(crate) fn set_bound(&mut self, (bound, report): (Arc<BoundModels>, Rc<JsValue>)) {
+        (self.bound, self.report) = (Some(bound), report);
         self.playing = None;
         self.prepare_parts();
         (self.is_moved, self.is_changed) = (true, true);
@@ -340,30 +316,39 @@ impl State {
         });
     }
 
-    /// The weights of the current models and cage.
+    /// The document with its weights, for exports and playback.
+    pub(crate) fn bound_document(&self) -> BoundDocument<'_> {
+        BoundDocument {
+            editor: &self.editor,
+            bound: self.bound.as_ref(),
+            parts: self.parts.as_ref(),
+            lattice: self.lattice.as_ref(),
+            ground: &self.ground,
+        }
+    }
+
+    /// Recomputes the posed models if the cage's pose has changed.
     ///
     /// # Errors
     /// Before a bind.
-    pub(crate) fn require_bound(&self) -> Answer<&BoundModels> {
-        self.bound.as_deref().ok_or_else(|| Fault::missing("weights", "bind the model first"))
+    pub(crate) fn pose_models(&mut self) -> Answer<()> {
+        let bound = self.bound_document();
+        bound.require_bound()?;
+        if self.held.posed_for != self.pose() {
+            self.held.posed = bound.deformed(self.pose())?;
+            self.held.posed_for = self.pose().to_vec();
+        }
+        Ok(())
     }
 
-    /// Computes the vertices of all models in a pose of the cage; their rest positions before a bind. `[n_vertices]`
-    ///
-    /// # Errors
-    /// If the pose belongs to another cage.
-    pub(crate) fn deformed(&self, pose: &[Vec3]) -> Answer<Vec<Vec3>> {
-        // At rest, return the vertices unchanged: weighted sums would add rounding errors.
-        let bound = self.bound.as_ref().filter(|_| *pose != self.rest().positions);
-        let Some(bound) = bound else { return Ok(self.models().positions().to_vec()) };
-        if pose.len() + bound.frames.n_columns() != bound.weights.n_columns() {
-            return Err(Fault::new(ErrorName::Error, "a pose belongs to another cage"));
+    /// The posed models, as of the last [`Self::pose_models`].
+    pub(crate) fn posed_models(&self) -> PosedModels<'_> {
+        PosedModels {
+            editor: &self.editor,
+            positions: &self.held.posed,
+            is_playing: self.playing.is_some(),
+            view: &self.camera,
         }
-        let mut positions = deform_bound(&bound.weights, &bound.frames, pose);
-        if let Some(parts) = &self.parts {
-            parts.hold(pose, &mut positions);
-        }
-        Ok(positions)
     }
 
     /// Joins the draw data of all models.
@@ -378,7 +363,7 @@ impl State {
     }
 
     /// Options of a playback that should be prepared again for the current pose.
-    pub(crate) fn stale_clip(&self) -> Option<JsRigOptions> {
+    pub(crate) fn stale_clip(&self) -> Option<RigOptions> {
         let playing = self.playing.as_ref().filter(|playing| playing.needs_update(&self.editor))?;
         Some(playing.options.clone())
     }
@@ -482,14 +467,8 @@ impl State {
             main.set_floaters(&self.floaters);
             self.on_gpu.floaters = Some(cage);
         }
-        main.set_field(if self.view.original { None } else { self.field() }, self.pose());
-    }
-
-    /// Computes the field that deforms the splats of a capture; `None` at rest and without a lattice.
-    pub(crate) fn field(&self) -> Option<Field> {
-        let is_posed = !self.editor.is_editing_rest() && self.editor.document().is_posed();
-        let lattice = self.lattice.as_ref().filter(|_| is_posed)?;
-        Some(lattice.pose(&self.rest().positions, self.pose()))
+        let field = if self.view.original { None } else { self.bound_document().field_of_splats() };
+        main.set_field(field, self.pose());
     }
 }
 
@@ -525,15 +504,12 @@ pub(crate) enum Upload {
 
 #[cfg(test)]
 mod tests {
-    use cagework_core::subdivided_box;
+    use cagework_core::{Frames, Weights, subdivided_box};
     use cagework_editor::edit::Element;
     use cagework_editor::{Command, Contents, Tools};
     use cagework_io::Model;
 
     use super::*;
-    use crate::held::Grab;
-    use crate::playing::ModelMotion;
-    use crate::puller::CAGE_SEED;
 
     /// Creates a state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
     fn uploaded() -> State {
@@ -562,7 +538,7 @@ mod tests {
                 Upload::Mesh => state.has_uploaded_mesh(),
                 Upload::Cage => state.on_gpu.cage = Some(key.cage),
                 Upload::Weights => {
-                    let bound = Arc::clone(state.cache.get(key).unwrap());
+                    let bound = state.cache.get(key).unwrap().clone();
                     state.set_bound(bound);
                 }
                 Upload::Parts => state.on_gpu.parts = Some(models),
@@ -577,20 +553,11 @@ mod tests {
         order
     }
 
-    fn bound_by(weights: Weights, frames: Frames) -> Arc<BoundModels> {
-        Arc::new(BoundModels {
-            weights: Arc::new(weights),
-            frames: Arc::new(frames),
-            rig: None,
-            outside: Vec::new(),
-            joints: None,
-            report: JsValue::UNDEFINED,
-        })
-    }
-
     fn bind(state: &mut State) {
-        let bound = bound_by(Weights::with_room(8, 0, 0), Frames::default());
-        state.cache.insert(state.editor.key(), Arc::clone(&bound), 100);
+        let rows = Weights::new(8, (0..=4).collect(), (0..4).collect(), vec![1.0; 4]).unwrap();
+        let bound = BoundModels::new(state.editor.document(), rows, Frames::default(), Vec::new());
+        let bound = (Arc::new(bound), Rc::default());
+        state.cache.insert(state.editor.key(), bound.clone(), 100);
         state.set_bound(bound);
     }
 
@@ -649,8 +616,7 @@ mod tests {
         let mut state = uploaded();
         bind(&mut state);
         let play = |state: &mut State, prepared_ms| {
-            let still = ModelMotion::Still(state.models().positions().to_vec());
-            let mut playing = Playback::new(&state.editor, JsRigOptions::default(), vec![(0, still)], None);
+            let mut playing = Playback::new(state.bound_document(), RigOptions::default()).unwrap();
             playing.prepared_ms = prepared_ms;
             state.playing = Some(playing);
         };
@@ -674,64 +640,23 @@ mod tests {
         assert!(state.playing.is_none(), "of another cage");
     }
 
+    /// Each row has the weight 1 for the control of the same number, so the vertices follow the controls, except the
+    /// painted one.
     #[test]
-    fn a_click_sets_a_pin_or_removes_it_and_a_grab_includes_the_other_pins() {
+    fn paint_holds_vertices_before_the_gpu_has_it() {
         let mut state = uploaded();
-        state.camera.set_viewport(Vec2::splat(100.0));
-        state.frame_all();
-        state.held.posed = state.models().positions().to_vec();
-        let inside = Vec3::splat(0.2);
-        let at = state.camera.project(inside).unwrap().position;
-        assert_eq!(state.pins_after(at, false), None);
-        let pins = state.pins_after(at, true).unwrap();
-        let place = state.place_of(pins[0]).unwrap();
-        assert!(state.camera.project(place).unwrap().position.distance(at) < 0.1, "{place}");
-        state.editor.apply(Command::SetPins { pins: pins.clone() }).unwrap();
-        assert_eq!((state.pins_beside(at), state.pins_after(at, true)), (vec![], Some(vec![])));
-        assert_eq!(state.pins_beside(at + Vec2::new(15.0, 0.0)), pins);
-        assert!(state.grip_of(Grab::Vertex(1)).is_none(), "before a bind");
         bind(&mut state);
-        let (row, seed) = state.grip_of(Grab::Vertex(1)).unwrap();
-        assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], CAGE_SEED));
-        assert!(state.grip_of(Grab::Vertex(8)).is_none());
-    }
-
-    /// Vertex 1 of the model is outside the cage, at a constant offset of 0.5 in x from the cage's first vertex.
-    /// The offset is an entry of the first of the six columns that follow those of the eight vertices.
-    #[test]
-    fn marks_of_grabs_follow_the_offsets_of_points_outside() {
-        let mut state = uploaded();
-        let at = state.pose()[0];
-        let frames = Frames::of_cage(state.pose());
-        let rows = Weights::new(14, vec![0, 1, 3, 4, 5], vec![0, 0, 8, 0, 0], vec![1.0, 1.0, 0.5, 1.0, 1.0]);
-        let corners = state.models().triangles()[0];
-        let bary = corners.map(|v| f32::from(u8::from(v == 1)));
-        state.held.points = vec![SurfacePoint { triangle: state.models().number_of(0), bary }];
-        assert!(state.held_marks().points.is_empty(), "before a bind");
-        state.set_bound(bound_by(rows.unwrap(), frames));
-        assert_eq!(state.held_marks().points, [at + Vec3::new(0.5, 0.0, 0.0)]);
-    }
-
-    /// Each row has the weight 1 for the control of the same number, so the vertices follow the controls. Vertex 1 stays.
-    #[test]
-    fn deformed_vertices_follow_their_weights_except_parts_that_stay() {
-        let mut state = uploaded();
         let rest = state.models().positions().to_vec();
         let pose: Vec<Vec3> = state.pose().iter().map(|p| *p + Vec3::X).collect();
-        assert_eq!(state.deformed(&pose).unwrap(), rest, "before a bind");
-        let weights = Weights::new(8, (0..=4).collect(), (0..4).collect(), vec![1.0; 4]).unwrap();
-        state.set_bound(bound_by(weights, Frames::default()));
         let id = state.models().iter().next().unwrap().id;
         state.editor.paint(id, |painted| *painted = vec![0, 255, 0, 0]);
         state.editor.commit("Paint");
         state.follow_document();
-        let moved = state.deformed(&pose).unwrap();
+        let moved = state.bound_document().deformed(&pose).unwrap();
         assert_eq!(moved, [pose[0], rest[1], pose[2], pose[3]]);
-        assert_eq!(state.deformed(&state.rest().positions).unwrap(), rest);
-        assert!(state.deformed(&pose[1..]).is_err());
         state.editor.undo();
         state.follow_document();
-        assert_eq!(state.deformed(&pose).unwrap(), pose[..4], "at once, before the GPU has the change");
+        assert_eq!(state.bound_document().deformed(&pose).unwrap(), pose[..4]);
     }
 
     #[test]

@@ -9,12 +9,12 @@ import type {
   BindOptions,
   BindReport,
   CageState,
-  Check,
   InnerElement,
-  Mend,
   ModelInfo,
+  Problem,
   Session,
 } from "../../src/contract";
+import type { Mend } from "../../src/derived";
 import type { AppState } from "../../src/state";
 import { INITIAL_STATE, STEPS } from "../../src/state";
 import { STOPS, solvers, stopsOf } from "../../src/tour/stops";
@@ -73,7 +73,7 @@ const CAGE: CageState = {
   usable: true,
   controls: { smooth: 0, inner: 0, elements: [], radius: null },
   radius: 0.1,
-  info: { vertices: 80, edges: 200, faces: 122, quads: 80, triangles: 122, bounds: BOUNDS, notices: [] },
+  info: { vertices: 80, edges: 200, faces: 122, quads: 80, bounds: BOUNDS, notices: [] },
 };
 const INNER_ELEMENTS: readonly InnerElement[] = [
   { point: 0 },
@@ -85,18 +85,13 @@ const CAGE_WITH_CONTROLS: CageState = {
   ...CAGE,
   controls: { smooth: 2, inner: 7, elements: [...INNER_ELEMENTS], radius: null },
 };
-const NONE = {
-  vertices: new Uint32Array(),
-  edges: new Uint32Array(),
-  faces: new Uint32Array(),
-  points: new Float32Array(),
-  outside: new Uint32Array(),
-};
-const PASSED_CHECK: Check = { problems: [], ...NONE };
-const checkOf = (mends: readonly (Mend | null)[], severity: "error" | "note", count: number): Check => ({
-  problems: mends.map((fix, k) => ({ code: "model_outside", severity, message: `${k}.`, count, fix })),
-  ...NONE,
-});
+const PLACES = { vertices: [], edges: [], faces: [], points: [] };
+/** Problems with these fixes; null for one without a fix. */
+const checkOf = (mends: readonly (Mend | null)[], severity: "error" | "note", count: number): Problem[] =>
+  mends.map((fix, k) => {
+    const fixes = fix && fix.kind !== "regenerate" ? [fix] : [];
+    return { code: "model_outside", severity, message: `${k}.`, count, places: PLACES, fixes };
+  });
 const REPAIRS = ["weld", "drop_degenerate", "mirror", "fill_holes", "flip", "grow"] as const;
 const MENDS: readonly Mend[] = [
   ...REPAIRS.map((repair) => ({ kind: "repair", repair }) as const),
@@ -119,7 +114,7 @@ const EARLIER_REPORTS = [...solvers(32), { solver: "cg", preconditioner: "v_cycl
 const BOUND_STATE: Patch = {
   model: RIG,
   cage: CAGE,
-  check: PASSED_CHECK,
+  check: [],
   bound: true,
   report: REPORT,
   steps: 1,

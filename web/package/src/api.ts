@@ -86,7 +86,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
         ...(origin ? { origin } : {}),
         positions: made.positions,
         corners: made.corners,
-        problems: made.check?.problems ?? [],
+        problems: made.check ?? [],
       };
     },
     async deform(weights, posed) {
@@ -94,8 +94,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const { pkg } = await runtime();
       let deformer = deformers.get(weights);
       if (!deformer) {
-        const { controls, indptr, indices, data, offsets } = weights;
-        deformer = new pkg.Deformer(controls, indptr, indices, data, offsets);
+        deformer = new pkg.Deformer(weights.controls, weights);
         deformers.set(weights, deformer);
       }
       return deformer.deform(pose);
@@ -107,12 +106,10 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const pose = poseOf(posed, arrays.positions);
       await requireGpu(options);
       const { pkg } = await runtime();
-      const { indptr, indices, data, offsets } = await run("lattice", input, options);
-      const { positions, corners, controls } = arrays;
-      const map = new pkg.FieldMap(positions, corners, controls, cells, indptr, indices, data, offsets);
+      const map = new pkg.FieldMap(arrays, cells, await run("lattice", input, options));
       map.pose(pose);
       return {
-        pose: (next) => map.pose(poseOf(next, positions)),
+        pose: (next) => map.pose(poseOf(next, arrays.positions)),
         map: (points) => map.map(pointsOf("points", points)),
         inverse: (points) => map.inverse(pointsOf("points", points)),
         gradient: (points) => map.gradient(pointsOf("points", points)),

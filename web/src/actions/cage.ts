@@ -1,8 +1,8 @@
 /** Makes cages (generated, as a box, or from a file) and repairs them. */
 
-import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
+import type { CageOptions, CheckedCage, Command, NamedFile, Reading, Repair } from "../contract";
 import { HULL_TARGET } from "../defaults";
-import { cageKey, cageSettings, hasUnmadeCage } from "../derived";
+import { cageKey, cageSettings, hasUnmadeCage, type Mend } from "../derived";
 import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
 import type { CageSettings } from "../state";
@@ -65,7 +65,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
   const box = (divisions: number): CheckedCage => ({ ...ctx.session().boxCage(divisions), check: null });
 
   const showPreview = (cage: CheckedCage | undefined) => {
-    engine().showDraft(cage?.positions ?? new Float32Array(), cage?.corners ?? new Uint32Array());
+    engine().showDraft(cage);
     ctx.store.set({ cagePreview: cage ? cage.positions.length / 3 : null });
   };
 

@@ -96,7 +96,7 @@ export function createControls(
     },
     /** Returns smoothing and interior controls for a link; undefined if the cage has neither. */
     shared(): SharedControls | undefined {
-      const controls = engine().cageControls();
+      const controls = engine().cageArrays().controls;
       if (controls.smooth === 0 && controls.inner === 0) return undefined;
       const rest = engine().restPositions();
       const inner = rest.slice(rest.length - 3 * controls.inner);

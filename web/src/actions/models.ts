@@ -54,7 +54,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
         remakeCage();
         void checked().then(() => {
           const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
-          const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
+          const isOut = store.get().check?.some(({ code }) => code === "model_outside");
           if (isOut) ctx.tell.say(T.models.outside, around);
         });
       });

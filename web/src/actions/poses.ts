@@ -21,8 +21,8 @@ export interface CageSnapshot {
 /** Copies the current cage and its poses; undefined without a cage. */
 export function snapshotCage(ctx: Context): CageSnapshot | undefined {
   const { cage, cageId: id, shares } = ctx.store.get();
-  const session = ctx.session();
-  return cage ? { cage: session.cageArrays(), id, poses: session.engine.carriable(), shares } : undefined;
+  const engine = ctx.engine();
+  return cage ? { cage: engine.cageArrays(), id, poses: engine.carriable(), shares } : undefined;
 }
 
 /** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for high-density screens. */

@@ -73,11 +73,12 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
   /** Sends the grabbed points, and all pins that are not grabbed, to the worker. */
   const grab = async (drag: Drag) => {
     const { pullWhole, tools } = store.get();
-    const [rows, seeds] = engine().gripsOf(drag.grabs, drag.from.x, drag.from.y);
+    const [rows, seeds, frames] = engine().gripsOf(drag.grabs, drag.from.x, drag.from.y);
     const { place, stays, reach } = await ctx.session().pullGrab({
       start: drag.before,
       rows,
       seeds,
+      frames,
       grabs: drag.grabs.length,
       options: {
         reach:

@@ -1,9 +1,9 @@
 /** Step 2: source of the cage, its problems, and reshaping. */
 
 import type { App } from "../app";
-import type { CageOptions, CageState, Check, Mend, Problem } from "../contract";
+import type { CageOptions, CageState, Problem } from "../contract";
 import { SLIDERS } from "../defaults";
-import { isCageSparse } from "../derived";
+import { isCageSparse, type Mend, mendOf } from "../derived";
 import { count, percent } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -36,7 +36,7 @@ export function CagePanel({ app }: { app: App }) {
         <div class="stack">
           {cage ? <CageCard cage={cage} check={check} /> : <p class="empty">{T.cage.none}</p>}
           {isCageSparse(app.store.get()) && <p class="hint">{sparse(app.store.get().cageOptions)}</p>}
-          {check?.problems.map((problem) => (
+          {check?.map((problem) => (
             <ProblemCard key={problem.message} problem={problem} app={app} />
           ))}
         </div>
@@ -73,7 +73,7 @@ function Reshape({ app }: { app: App }) {
   );
 }
 
-function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
+function CageCard({ cage, check }: { cage: CageState; check: readonly Problem[] | null }) {
   return (
     <div class="card stack tight">
       <div class="row wrap">
@@ -94,10 +94,10 @@ function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
   );
 }
 
-function CageBadge({ cage, check }: { cage: CageState; check: Check | null }) {
+function CageBadge({ cage, check }: { cage: CageState; check: readonly Problem[] | null }) {
   if (!cage.usable) return <Badge kind="bad" icon="warning" text={T.cage.needsRepair} />;
   if (!check) return <span class="badge">{T.cage.checking}</span>;
-  return check.problems.some((problem) => problem.code === "model_outside") ? (
+  return check.some((problem) => problem.code === "model_outside") ? (
     <Badge kind="warn" icon="warning" text={T.cage.outside} />
   ) : (
     <Badge kind="good" icon="check" text={T.cage.encloses} />
@@ -111,7 +111,7 @@ export function sayMend(fix: Mend, count: number): string {
 }
 
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
-  const { fix } = problem;
+  const fix = mendOf(problem);
   // If the fix is a finer grid, choosing one solves the problem.
   const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return (

@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { cageBroken, hasUnmadeCage } from "../derived";
+import { cageBroken, hasUnmadeCage, mendOf } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
@@ -74,10 +74,10 @@ function cageAction(state: AppState, app: App): Action | undefined {
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
   if (!state.cage) return make(T.panel.makeCage);
   if (!cageBroken(state) || hasUnmadeCage(state)) return undefined;
-  const found = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix);
-  if (!found?.fix) return make(T.panel.newCage);
-  const { fix, count } = found;
-  return { label: sayMend(fix, count), icon: "patch", run: () => app.cage.mend(fix) };
+  const found = state.check?.find((problem) => problem.severity === "error");
+  const fix = found && mendOf(found);
+  if (!fix) return make(T.panel.newCage);
+  return { label: sayMend(fix, found.count), icon: "patch", run: () => app.cage.mend(fix) };
 }
 
 const BODIES: Record<StepName, (props: { app: App }) => preact.JSX.Element> = {

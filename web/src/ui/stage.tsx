@@ -99,7 +99,7 @@ function Placing({ app }: { app: App }) {
 /** Live result of the cage check while the cage is reshaped. */
 function Encloses({ app }: { app: App }) {
   const { cage, check, strays } = app.store.get();
-  const fault = check?.problems.find((problem) => problem.severity !== "note");
+  const fault = check?.find((problem) => problem.severity !== "note");
   const message = strays > 0 ? T.cage.partOutside : fault && sentence(fault.message);
   const kind = cage?.usable === false ? "bad" : message ? "warn" : check ? "good" : "";
   return (

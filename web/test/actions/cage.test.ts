@@ -59,7 +59,7 @@ it("adding a control carries the poses over; smoothing does not need to", () => 
   expect(cage.setSmooth(2)).toBe(true);
   expect([commands, carried]).toEqual([[{ do: "subdivide", steps: 2 }], []]);
   teach({
-    apply: () => void engine.setCage(new Float32Array(15), new Uint32Array(), undefined, [], undefined),
+    apply: () => void engine.setCage(cageOf(5), undefined),
   });
   cage.change("Put a point inside", { do: "add_control", kind: "point", places: [[0, 0, 0]] });
   expect(carried.map(({ cage: { positions } }) => positions.length)).toEqual([12]);

@@ -1,18 +1,18 @@
 import { expect, it } from "vitest";
 import { createEdit } from "../../src/actions/edit";
 import { createModels } from "../../src/actions/models";
+import type { Problem } from "../../src/contract";
 import { cageOf, createFake, memberOf, modelOf, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
-const none = new Uint32Array();
-const CHECK = { vertices: none, edges: none, faces: none, points: new Float32Array(), outside: none };
-const OUTSIDE_FAULT = {
+const OUTSIDE_FAULT: Problem = {
   code: "model_outside",
   severity: "warning",
   message: "",
   count: 1,
-  fix: null,
-} as const;
+  places: { vertices: [], edges: [], faces: [], points: [] },
+  fixes: [],
+};
 
 /** A page with a bound body in a cage. */
 function page() {
@@ -113,7 +113,7 @@ it("a model outside the cage is reported once, with the offer of a new cage", as
   const { models, read, mirror, said, offer, steps } = page();
   const added = models.add([file("skirt.glb"), file("body-cage.obj")]);
   await settled();
-  mirror.know({ ...CHECK, problems: [OUTSIDE_FAULT] });
+  mirror.know([OUTSIDE_FAULT]);
   await read("skirt.glb");
   await added;
   expect(said).toEqual(["The added model reaches outside the cage."]);

@@ -1,22 +1,20 @@
 //! Methods that create, read, reshape and pose the cage.
 
-use std::collections::BTreeSet;
-
 use cagework_cage::generate::BOX_MARGIN;
 use cagework_core::bind::{estimate_memory, estimate_updates};
-use cagework_core::{PolygonMesh, subdivided_box};
-use cagework_editor::Command;
+use cagework_core::{Bounds, subdivided_box};
+use cagework_editor::edit::Topology;
+use cagework_editor::{CageState, Command, PageBindOptions};
 use cagework_io::{decode_pose, encode_pose};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::arrays::{corners, flat, points, polygon_mesh};
-use crate::binder::Polygons;
-use crate::controls;
+use crate::arrays::{flat, points};
+use crate::cage::CageArrays;
 use crate::error::{Answer, Fault};
-use crate::options::{JsBindOptions, decode};
-use crate::views::optional;
+use crate::options::decode;
+use crate::views::{object, optional};
 
 #[wasm_bindgen]
 impl Engine {
@@ -25,35 +23,30 @@ impl Engine {
     ///
     /// # Errors
     /// If no model is open.
-    #[wasm_bindgen(js_name = boxCage)]
-    pub fn box_cage(&self, divisions: u32) -> Result<Polygons, JsValue> {
-        let mesh = self.read(|state| {
-            let bounds = cagework_core::Bounds::of(state.models().positions())
-                .ok_or_else(|| Fault::missing("model", "open one first"))?;
-            let longest = bounds.extent().max_element().max(f32::MIN_POSITIVE);
-            let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
-            Answer::Ok(subdivided_box(bounds, BOX_MARGIN, bounds.extent().to_array().map(cut)))
-        })?;
-        Ok(mesh.into())
+    #[wasm_bindgen(js_name = boxCage, unchecked_return_type = "CageArrays")]
+    pub fn box_cage(&self, divisions: u32) -> Answer<JsValue> {
+        let bounds = self.read(|state| Bounds::of(state.models().positions()));
+        let bounds = bounds.ok_or_else(|| Fault::missing("model", "open one first"))?;
+        let longest = bounds.extent().max_element().max(f32::MIN_POSITIVE);
+        let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
+        let mesh = subdivided_box(bounds, BOX_MARGIN, bounds.extent().to_array().map(cut));
+        Ok(object(&CageArrays::of(&mesh)))
     }
 
-    /// Replaces the cage. `corners`: for each face its corner count, then its vertex indices. A mesh that is not a
-    /// valid cage is stored as a draft; `Binder.checkCage` finds its faults. Without `controls`, the current interior
-    /// controls are kept if they fit into the new cage. With a label, adds a step to the history.
+    /// Replaces the cage. A mesh that is not a valid cage is stored as a draft; `Binder.checkCage` finds its faults. With a
+    /// label, adds a step to the history.
     ///
     /// # Errors
     /// If the arrays are not a polygon mesh, or a control does not fit into the cage. The document is then unchanged.
     #[wasm_bindgen(js_name = setCage, unchecked_return_type = "CageState")]
     pub fn set_cage(
         &self,
-        positions: &[f32],
-        corners: &[u32],
-        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
-        notices: Vec<String>,
+        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
         label: Option<String>,
-    ) -> Result<JsValue, JsValue> {
-        let (mesh, controls) = (polygon_mesh(positions, corners)?, controls::from_js(controls)?);
-        let is_step = label.is_some();
+    ) -> Answer<JsValue> {
+        let cage: CageArrays = decode(cage)?;
+        let (mesh, is_step) = (cage.mesh()?, label.is_some());
+        let CageArrays { controls, notices, .. } = cage;
         self.step(Command::ReplaceCage { mesh, controls, notices }, label)?;
         if !is_step {
             self.change(|state| state.editor.amend());
@@ -61,21 +54,21 @@ impl Engine {
         Ok(self.cage_state())
     }
 
-    /// Draws the edges of another cage in place of the current one, until this is called with empty arrays or the cage
-    /// changes. `corners`: as for `setCage`.
+    /// Draws the edges of another cage in place of the current one, until this is called without a cage or the cage
+    /// changes.
     ///
     /// # Errors
     /// If the arrays are not a polygon mesh.
     #[wasm_bindgen(js_name = showDraft)]
-    pub fn show_draft(&self, positions: &[f32], corners: &[u32]) -> Result<(), JsValue> {
-        let PolygonMesh { positions, faces } = polygon_mesh(positions, corners)?;
-        let sides = faces.iter().flat_map(|face| {
-            let next = face.iter().cycle().skip(1);
-            face.iter().zip(next).map(|(&a, &b)| [a.min(b), a.max(b)])
-        });
-        let edges: BTreeSet<[u32; 2]> = sides.collect();
+    pub fn show_draft(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "CageArrays | undefined")] cage: JsValue,
+    ) -> Answer<()> {
+        let cage: Option<CageArrays> = decode(cage)?;
+        let mesh = cage.map(|cage| cage.mesh()).transpose()?.unwrap_or_default();
+        let edges = Topology::new(&mesh.faces).edges.into_iter();
         self.change(|state| {
-            state.draft = edges.into_iter().map(|edge| edge.map(|i| positions[i as usize])).collect();
+            state.draft = edges.map(|edge| edge.map(|i| mesh.positions[i as usize])).collect();
             state.is_changed = true;
         });
         Ok(())
@@ -84,7 +77,7 @@ impl Engine {
     /// Properties of the cage for panels; undefined without a cage.
     #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
     pub fn cage_state(&self) -> JsValue {
-        self.read(|state| optional(state.cage_state()))
+        self.read(|state| optional(CageState::of(state.cage())))
     }
 
     /// Applies a command to the document. With a label, adds a step to the history; otherwise the next history step
@@ -96,8 +89,8 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "Command")] command: JsValue,
         label: Option<String>,
-    ) -> Result<(), JsValue> {
-        Ok(self.step(decode(command)?, label)?)
+    ) -> Answer<()> {
+        self.step(decode(command)?, label)
     }
 
     /// Adds a step to the history with all changes since the last history step; false if nothing has changed.
@@ -135,10 +128,13 @@ impl Engine {
         self.change(|state| state.editor.clear_history());
     }
 
-    /// For each face of the cage its corner count, then its vertex indices.
-    #[wasm_bindgen(js_name = cageCorners)]
-    pub fn cage_corners(&self) -> Vec<u32> {
-        self.read(|state| corners(&state.rest().faces))
+    /// The cage at rest, with its interior controls.
+    #[wasm_bindgen(js_name = cageArrays, unchecked_return_type = "CageArrays & { controls: CageControls }")]
+    pub fn cage_arrays(&self) -> JsValue {
+        self.read(|state| {
+            let controls = Some(state.cage().controls.clone());
+            object(&CageArrays { controls, ..CageArrays::of(state.rest()) })
+        })
     }
 
     /// Cage vertices and interior controls at rest. `[n_controls, 3]`
@@ -190,18 +186,16 @@ impl Engine {
     pub fn estimate_memory(
         &self,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
-    ) -> Result<f64, JsValue> {
-        let request: JsBindOptions = decode(options)?;
+    ) -> Answer<f64> {
+        let request: PageBindOptions = decode(options)?;
         if self.read(|state| state.n_rig.is_none()) {
             let n = self.read(|state| Answer::Ok(state.models().extra_points()?.len()))?;
             self.state.borrow_mut().n_rig = Some(n);
         }
-        let bytes = self.read(|state| {
-            let set = state.require_set()?;
+        self.read(|state| {
             let n = state.models().positions().len() + state.n_rig.unwrap_or(0);
-            Answer::Ok(estimate_memory(set, n, &request.options)?)
-        })?;
-        Ok(bytes as f64)
+            Ok(estimate_memory(state.require_set()?, n, &request.options)? as f64)
+        })
     }
 
     /// Estimates the work of a bind as a number of updates of one value at a grid node. A processor core does about
@@ -213,9 +207,9 @@ impl Engine {
     pub fn estimate_updates(
         &self,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
-    ) -> Result<f64, JsValue> {
-        let request: JsBindOptions = decode(options)?;
-        Ok(self.read(|state| Answer::Ok(estimate_updates(state.require_set()?, &request.options)?))?)
+    ) -> Answer<f64> {
+        let request: PageBindOptions = decode(options)?;
+        self.read(|state| Ok(estimate_updates(state.require_set()?, &request.options)?))
     }
 
     /// Encodes the current pose compactly, in the axes of the model's file.
@@ -232,11 +226,12 @@ impl Engine {
     /// # Errors
     /// If the bytes are damaged or belong to another cage.
     #[wasm_bindgen(js_name = decodePose)]
-    pub fn decode_pose(&self, bytes: &[u8]) -> Result<(), JsValue> {
-        let pose = self.read(|state| decode_pose(&state.up().turned_back(&state.rest().positions), bytes));
-        let pose = pose.map_err(Fault::from)?;
-        let pose = self.read(|state| state.up().turned(&pose).into_owned());
-        Ok(self.change(|state| state.editor.set_pose(pose)).map_err(Fault::from)?)
+    pub fn decode_pose(&self, bytes: &[u8]) -> Answer<()> {
+        self.change(|state| {
+            let up = state.up();
+            let pose = decode_pose(&up.turned_back(&state.rest().positions), bytes)?;
+            Ok(state.editor.set_pose(up.turned(&pose).into_owned())?)
+        })
     }
 }
 

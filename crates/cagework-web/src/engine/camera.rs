@@ -1,6 +1,6 @@
 //! Methods that read and move the camera.
 
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::TAU;
 
 use cagework_core::Bounds;
 use cagework_gpu::render::{AxisView, Projection};
@@ -9,9 +9,10 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::error::{ErrorName, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 use crate::options::decode;
-use crate::views::{CameraView, object};
+use crate::state::State;
+use crate::views::object;
 
 /// Length of a pointer movement that orbits the camera by 360 degrees, CSS pixels.
 const PIXELS_PER_TURN: f32 = 900.0;
@@ -21,14 +22,7 @@ impl Engine {
     /// Target, direction, distance and projection of the camera.
     #[wasm_bindgen(unchecked_return_type = "CameraView")]
     pub fn camera(&self) -> JsValue {
-        let camera = self.read(|state| state.camera);
-        object(&CameraView {
-            target: camera.target.to_array(),
-            yaw: camera.yaw,
-            pitch: camera.pitch,
-            distance: camera.distance,
-            parallel: camera.projection == Projection::Orthographic,
-        })
+        self.read(|state| object(&state.camera.view()))
     }
 
     /// Sets the camera's target, direction, distance and projection.
@@ -39,23 +33,11 @@ impl Engine {
     pub fn set_camera(
         &self,
         #[wasm_bindgen(unchecked_param_type = "CameraView")] view: JsValue,
-    ) -> Result<(), JsValue> {
-        let view: CameraView = decode(view)?;
-        let is_finite =
-            Vec3::from(view.target).is_finite() && view.yaw.is_finite() && view.distance.is_finite();
-        let is_view = is_finite && view.pitch.abs() <= FRAC_PI_2 && view.distance > 0.0;
-        if !is_view {
-            return Err(Fault::new(ErrorName::Error, "the camera of this link is invalid").into());
-        }
-        self.change(|state| {
-            let camera = &mut state.camera;
-            camera.target = view.target.into();
-            (camera.yaw, camera.pitch, camera.distance) = (view.yaw, view.pitch, view.distance);
-            camera.projection =
-                if view.parallel { Projection::Orthographic } else { Projection::Perspective };
-            camera.keep_visible();
-        });
-        Ok(())
+    ) -> Answer<()> {
+        let view = decode(view)?;
+        let is_view = self.change(|state| state.camera.set_view(view));
+        let invalid = || Fault::new(ErrorName::Error, "the camera of this link is invalid");
+        is_view.then_some(()).ok_or_else(invalid)
     }
 
     /// Orbits the camera by a pointer movement in CSS pixels.
@@ -82,7 +64,7 @@ impl Engine {
     /// Moves the camera to fit the posed cage into the view, or the models if there is no cage.
     #[wasm_bindgen(js_name = frameAll)]
     pub fn frame_all(&self) {
-        self.change(super::super::state::State::frame_all);
+        self.change(State::frame_all);
     }
 
     /// Moves the camera so that the selected vertices fit into the view. If nothing is selected, acts as `frameAll`.
@@ -106,15 +88,7 @@ impl Engine {
     /// Looks along an axis, 0 to 2, from its positive end, or from its negative end if `negative` is set.
     #[wasm_bindgen(js_name = axisView)]
     pub fn axis_view(&self, axis: u32, negative: bool) {
-        let view = match (axis, negative) {
-            (0, false) => AxisView::Right,
-            (0, true) => AxisView::Left,
-            (1, false) => AxisView::Top,
-            (1, true) => AxisView::Bottom,
-            (_, false) => AxisView::Front,
-            (_, true) => AxisView::Back,
-        };
-        self.change(|state| state.camera.look_along(view));
+        self.change(|state| state.camera.look_along(AxisView::from_end(axis, negative)));
     }
 
     /// Toggles between perspective and parallel projection; returns true if the projection is now parallel.

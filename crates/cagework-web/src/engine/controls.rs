@@ -5,37 +5,28 @@ use cagework_editor::Command;
 use cagework_editor::edit::pick_middle;
 use cagework_io::read_inner_controls;
 use glam::Vec3;
-use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::points;
-use crate::error::Fault;
+use crate::error::Answer;
 use crate::options::READ_LIMIT;
-use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Subdivision and interior controls of the cage, in the form that `setCage` takes.
-    #[wasm_bindgen(js_name = cageControls, unchecked_return_type = "CageControls")]
-    pub fn cage_controls(&self) -> JsValue {
-        self.read(|state| object(&state.cage().controls))
-    }
-
     /// Replaces the interior controls by the controls in an OBJ file, and adds a step to the history.
     ///
     /// # Errors
     /// If the file cannot be read, or a control does not fit into the cage. The document is then unchanged.
     #[wasm_bindgen(js_name = readControls)]
-    pub fn read_controls(&self, bytes: &[u8], label: String) -> Result<(), JsValue> {
+    pub fn read_controls(&self, bytes: &[u8], label: String) -> Answer<()> {
         let origin = self.read(|state| state.models().origin());
-        let InnerControls { positions, elements, .. } =
-            read_inner_controls(bytes, origin, READ_LIMIT).map_err(Fault::from)?;
+        let InnerControls { positions, elements, .. } = read_inner_controls(bytes, origin, READ_LIMIT)?;
         if elements.is_empty() {
-            return Err(Fault::from(ControlError::Empty).into());
+            return Err(ControlError::Empty.into());
         }
         let positions = self.read(|state| state.up().turned(&positions).into_owned());
-        Ok(self.step(Command::ReplaceControls { positions, elements }, Some(label))?)
+        self.step(Command::ReplaceControls { positions, elements }, Some(label))
     }
 
     /// Chooses the position of a new control: a point inside the rest model under the pointer, midway between the first
@@ -62,14 +53,14 @@ impl Engine {
     /// # Errors
     /// If even the smallest sheet does not fit.
     #[wasm_bindgen(js_name = addSheet)]
-    pub fn add_sheet(&self, center: &[f32], label: String) -> Result<(), JsValue> {
+    pub fn add_sheet(&self, center: &[f32], label: String) -> Answer<()> {
         let axes = self.read(|state| {
             let (right, up) = (state.camera.right(), state.camera.up());
             let half = 0.5 * state.editor.bounds().map_or(Vec3::ZERO, |b| b.extent());
             [right * right.abs().dot(half), up * up.abs().dot(half)]
         });
         let center = points(center).first().copied().unwrap_or_default();
-        Ok(self.step(Command::AddSheet { center, axes }, Some(label))?)
+        self.step(Command::AddSheet { center, axes }, Some(label))
     }
 
     /// Shows the points of an interior control that is being placed. `[n, 3]`

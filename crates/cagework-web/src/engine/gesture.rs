@@ -8,6 +8,7 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
+use crate::error::Answer;
 use crate::options::decode;
 use crate::state::State;
 use crate::views::{object, optional};
@@ -28,7 +29,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "Gesture")] kind: JsValue,
         x: f32,
         y: f32,
-    ) -> Result<bool, JsValue> {
+    ) -> Answer<bool> {
         let kind = decode(kind)?;
         Ok(self.change(|state| {
             let at = state.pointer(x, y);
@@ -64,7 +65,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "GizmoPart")] part: JsValue,
         x: f32,
         y: f32,
-    ) -> Result<bool, JsValue> {
+    ) -> Answer<bool> {
         let part = decode(part)?;
         Ok(self.change(|state| {
             let kind = match state.view.gizmo.unwrap_or_default() {

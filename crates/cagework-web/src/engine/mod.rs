@@ -22,7 +22,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use async_lock::Mutex;
-use cagework_core::{Coordinates, Weights};
+use cagework_core::Coordinates;
+use cagework_editor::BoundModels;
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, check_layers};
 use js_sys::Function;
@@ -31,17 +32,16 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
-use crate::binder::Offsets;
-use crate::error::{ErrorName, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu, upload};
 use crate::incoming::{self, page_turn};
-use crate::joints::JointDots;
 use crate::loaded::LoadedModel;
 use crate::opening::OpenContents;
 use crate::options::decode;
-use crate::state::{BoundModels, State, joined};
+use crate::state::{State, joined};
 use crate::surface::CanvasSurface;
 use crate::views::{View, object};
+use crate::weights::Offsets;
 
 /// Models, cage, camera and rendering of one page.
 #[wasm_bindgen]
@@ -68,7 +68,7 @@ impl Engine {
         canvas: HtmlCanvasElement,
         invalidate: Function,
         #[wasm_bindgen(unchecked_param_type = "(view: View) => void")] changed: Function,
-    ) -> Result<Engine, JsValue> {
+    ) -> Answer<Engine> {
         let (surface, context) = CanvasSurface::open(canvas).await?;
         let gpu = Gpu { main: Session::new(context), others: Vec::new(), surface };
         Ok(Self {
@@ -90,14 +90,14 @@ impl Engine {
         &self,
         models: Vec<LoadedModel>,
         #[wasm_bindgen(unchecked_param_type = "OpenContents")] contents: JsValue,
-    ) -> Result<Vec<String>, JsValue> {
+    ) -> Answer<Vec<String>> {
         let contents: OpenContents = decode(contents)?;
         let mut models = models;
         if models.len() > 1 && models.iter().any(|loaded| loaded.model.n_faces() == 0) {
-            return Err(one_capture().into());
+            return Err(one_capture());
         }
         let Some(first) = models.first_mut() else {
-            return Err(Fault::missing("model", "open one first").into());
+            return Err(Fault::missing("model", "open one first"));
         };
         let (contents, settings) = contents.read(first)?;
         let mut notices = Vec::new();
@@ -123,8 +123,7 @@ impl Engine {
             let gpu = gpu.as_mut().ok_or_else(lost)?;
             for (model, _) in &models {
                 let (camera, size) = self.read(|state| state.view_of(&model.positions));
-                check_layers(gpu.main.context(), &camera, &model.positions, &model.triangles, size)
-                    .map_err(Fault::from)?;
+                check_layers(gpu.main.context(), &camera, &model.positions, &model.triangles, size)?;
             }
             page_turn().await;
             let draw = joined(&draws.iter().collect::<Vec<_>>());
@@ -133,7 +132,7 @@ impl Engine {
             if let Err(error) = gpu.main.set_shared_model(draw).await {
                 // `change` starts an upload of the previous models, because `forget_gpu` marked all data as missing.
                 self.change(|_| ());
-                return Err(Fault::from(error).into());
+                return Err(error.into());
             }
             self.change(|state| {
                 state.editor.open(models, contents);
@@ -166,31 +165,24 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let (revision, key) = self.read(|state| (state.revision, state.editor.key()));
         let n_columns = self.read(|state| state.rest().positions.len() as u32);
-        let n_vertices = self.read(|state| state.models().positions().len());
         let Offsets { frames, outside } = decode(offsets)?;
         let n_columns = n_columns + frames.n_columns() as u32;
         let all = incoming::weights(n_columns, &indptr, &rows).await?;
-        let (weights, rig) = split(all, n_vertices);
         let is_current = || self.read(|state| state.require(revision));
+        is_current()?;
+        let bound = self.read(|state| BoundModels::new(state.editor.document(), all, frames, outside));
+        let bound = Arc::new(bound);
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         // Finish pending uploads first: uploading a cage drops the weights on the GPU.
         upload(&self.state, gpu).await?;
         is_current()?;
-        let (weights, frames) = (Arc::new(weights), Arc::new(frames));
-        gpu.main.adopt(Arc::clone(&weights), Arc::clone(&frames)).await.map_err(Fault::from)?;
+        gpu.main.adopt(Arc::clone(&bound.weights), Arc::clone(&bound.frames)).await.map_err(Fault::from)?;
         is_current()?;
         self.change(|state| {
-            let joints = rig.as_ref().and_then(|weights| {
-                let of_rig = outside.iter().filter_map(|o| o.vertex.checked_sub(n_vertices as u32));
-                let of_rig: Vec<u32> = of_rig.collect();
-                // A rig with errors gets no joint marks here; the export reports the errors.
-                JointDots::new(state.models(), weights, (*frames).clone(), &of_rig).ok()
-            });
-            let bytes = weights.bytes() + rig.as_ref().map_or(0, Weights::bytes);
-            let bound = Arc::new(BoundModels { weights, frames, rig, outside, joints, report });
+            let (bytes, bound) = (bound.bytes(), (bound, Rc::new(report)));
             if is_final {
-                state.cache.insert(key, Arc::clone(&bound), bytes);
+                state.cache.insert(key, bound.clone(), bytes);
             }
             state.set_bound(bound);
         });
@@ -206,7 +198,7 @@ impl Engine {
     /// Bind report of the weights in use; undefined without weights.
     #[wasm_bindgen(js_name = boundReport, unchecked_return_type = "BindReport | undefined")]
     pub fn bound_report(&self) -> JsValue {
-        self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
+        self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |_| JsValue::clone(&state.report)))
     }
 
     /// Adds closed-form coordinates of a kind, for comparison. Arrays as for `adopt`.
@@ -252,7 +244,7 @@ impl Engine {
     pub fn has_other(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
-    ) -> Result<bool, JsValue> {
+    ) -> Answer<bool> {
         let kind = decode(kind)?;
         Ok(self.read(|state| state.others.contains(&kind)))
     }
@@ -268,8 +260,8 @@ impl Engine {
     /// # Errors
     /// `Cancelled` if models or cage have changed since that revision.
     #[wasm_bindgen(js_name = requireCurrent)]
-    pub fn require_current(&self, revision: u32) -> Result<(), JsValue> {
-        Ok(self.read(|state| state.require(revision))?)
+    pub fn require_current(&self, revision: u32) -> Answer<()> {
+        self.read(|state| state.require(revision))
     }
 
     /// Whether weights are in use, so that the model follows the cage.
@@ -282,12 +274,12 @@ impl Engine {
     ///
     /// # Errors
     /// If no device is open.
-    pub async fn lost(&self) -> Result<String, JsValue> {
+    pub async fn lost(&self) -> Answer<String> {
         let receiver = {
             let gpu = self.gpu.lock().await;
             gpu.as_ref().ok_or_else(lost)?.main.context().lost()
         };
-        Ok(receiver.await.map_err(|_| Fault::new(ErrorName::DeviceLost, "the GPU is gone"))?)
+        receiver.await.map_err(|_| Fault::new(ErrorName::DeviceLost, "the GPU is gone"))
     }
 
     /// Marks the GPU device as lost. The page calls this when the browser reports a loss; tests call it to simulate
@@ -303,12 +295,12 @@ impl Engine {
     /// # Errors
     /// `NoAdapter` or `NoDevice` if no GPU can be opened yet; `Canvas` if the GPU cannot draw into the canvas. Also if
     /// the GPU runs out of memory.
-    pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
+    pub async fn recover(&self, canvas: HtmlCanvasElement) -> Answer<()> {
         let (surface, context) = CanvasSurface::open(canvas).await?;
         {
             let mut shared = self.gpu.lock().await;
             let gpu = shared.as_mut().ok_or_else(lost)?;
-            let main = gpu.main.recover(context).await.map_err(Fault::from)?;
+            let main = gpu.main.recover(context).await?;
             *gpu = Gpu { main, others: Vec::new(), surface };
             // The document may have changed while the device was opened.
             upload(&self.state, gpu).await?;
@@ -378,16 +370,6 @@ impl Engine {
             engine.announce();
         });
     }
-}
-
-/// Splits weights into rows of the vertices and rows of the rigs' points; `None` for the latter if there are no such
-/// points.
-fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
-    let n = weights.n_rows();
-    if n <= n_vertices {
-        return (weights, None);
-    }
-    (weights.row_range(0..n_vertices), Some(weights.row_range(n_vertices..n)))
 }
 
 fn one_capture() -> Fault {

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use cagework_editor::edit::pick_surface;
+use cagework_editor::ModelInfo;
 use cagework_gpu::render::check_layers;
 use cagework_io::Model;
-use glam::Vec3;
 use js_sys::Uint8Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -16,13 +15,7 @@ use crate::gpu::upload;
 use crate::incoming::page_turn;
 use crate::loaded::LoadedModel;
 use crate::state::State;
-use crate::views::{ModelInfo, object};
-
-/// [Painted amount](cagework_editor::Member::painted) of a vertex that stays in place.
-const MAX_AMOUNT: f32 = 255.0;
-/// Fraction of the brush radius within which the full amount is painted; beyond it, the amount falls linearly to 0 at
-/// the rim.
-const FULL_SHARE: f32 = 0.5;
+use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
@@ -31,10 +24,10 @@ impl Engine {
     ///
     /// # Errors
     /// The errors of `open`. The document is then unchanged.
-    pub async fn add(&self, models: Vec<LoadedModel>, label: Option<String>) -> Result<(), JsValue> {
+    pub async fn add(&self, models: Vec<LoadedModel>, label: Option<String>) -> Answer<()> {
         let is_capture = self.read(|state| state.models().splats().is_some());
         if is_capture || models.iter().any(|loaded| loaded.model.n_faces() == 0) {
-            return Err(one_capture().into());
+            return Err(one_capture());
         }
         let (up, origin) = self.read(|state| (state.up(), state.models().origin()));
         let (mut added, mut draws) = (Vec::new(), Vec::new());
@@ -46,12 +39,12 @@ impl Engine {
             added.push((loaded.model, settings));
             page_turn().await;
         }
-        let added = self.change_models(label, |state| {
+        let add = |state: &mut State| {
             let ids = state.editor.add_models(added);
             state.draws.extend(ids.zip(draws));
             Ok(())
-        });
-        Ok(added.await?)
+        };
+        self.change_models(label, add).await
     }
 
     /// Replaces a model by one with the same surface, as a step of the history, see `Models::replace`. Drops the weights.
@@ -59,14 +52,14 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no such model, and the errors of `open`. The document is then unchanged.
-    pub async fn replace(&self, id: u32, mut loaded: LoadedModel, label: String) -> Result<(), JsValue> {
+    pub async fn replace(&self, id: u32, mut loaded: LoadedModel, label: String) -> Answer<()> {
         let draw = Arc::new(loaded.draw_model());
-        let replaced = self.change_models(Some(label), |state| {
+        let replace = |state: &mut State| {
             let own = state.editor.replace_model(id, loaded.model)?;
             state.draws.insert(own, draw);
             Ok(())
-        });
-        Ok(replaced.await?)
+        };
+        self.change_models(Some(label), replace).await
     }
 
     /// Converts a model to arrays, from which `LoadedModel.restore` recreates it in a worker.
@@ -74,7 +67,7 @@ impl Engine {
     /// # Errors
     /// If no open model has this id.
     #[wasm_bindgen(js_name = storedModel)]
-    pub fn stored_model(&self, id: u32) -> Result<Vec<Uint8Array>, JsValue> {
+    pub fn stored_model(&self, id: u32) -> Answer<Vec<Uint8Array>> {
         let model = self.read(|state| Answer::Ok(Model::clone(&state.models().get(id)?.model)))?;
         Ok(LoadedModel::new(model).store())
     }
@@ -95,8 +88,8 @@ impl Engine {
     /// # Errors
     /// If no model is open.
     #[wasm_bindgen(js_name = modelInfo, unchecked_return_type = "ModelInfo")]
-    pub fn model_info(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| ModelInfo::of(state.models()).map(|info| object(&info)))?)
+    pub fn model_info(&self) -> Answer<JsValue> {
+        self.read(|state| Ok(object(&ModelInfo::of(state.models())?)))
     }
 
     /// Painted amount of each vertex of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, empty
@@ -104,8 +97,8 @@ impl Engine {
     ///
     /// # Errors
     /// If no open model has this id.
-    pub fn painted(&self, id: u32) -> Result<Vec<u8>, JsValue> {
-        Ok(self.read(|state| Answer::Ok(state.models().get(id)?.painted.to_vec()))?)
+    pub fn painted(&self, id: u32) -> Answer<Vec<u8>> {
+        self.read(|state| Ok(state.models().get(id)?.painted.to_vec()))
     }
 
     /// Shows in colour how much each vertex of a model stays in place, and selects this model for `paint`; undefined
@@ -124,19 +117,18 @@ impl Engine {
     ///
     /// # Errors
     /// Without weights.
-    pub fn paint(&self, x: f32, y: f32, radius: f32, amount: u8) -> Result<bool, JsValue> {
+    pub fn paint(&self, x: f32, y: f32, radius: f32, amount: u8) -> Answer<bool> {
         let Some(id) = self.read(|state| state.painting.as_ref().map(|(id, _)| *id)) else {
             return Ok(false);
         };
-        // Update the posed models, which `dab` picks from.
-        self.posed(|_| ())?;
-        Ok(self.change(|state| {
-            let is_painted = state.dab(id, [x, y], radius, amount);
-            if is_painted {
+        let brush = self.posed(|state| state.posed_models().brush(id, state.pointer(x, y), radius))?;
+        if let Some(brush) = brush {
+            self.change(|state| {
+                state.editor.dab(id, brush, &state.held.posed, amount);
                 state.show_painting();
-            }
-            is_painted
-        }))
+            });
+        }
+        Ok(brush.is_some())
     }
 
     /// Returns the brush radius of [`Engine::paint`] at the pointer, in CSS pixels; undefined if `paint` would have no
@@ -145,8 +137,8 @@ impl Engine {
     pub fn brush_radius(&self, x: f32, y: f32, radius: f32) -> Option<f32> {
         let radius = |state: &State| {
             let (id, _) = state.painting.as_ref()?;
-            let (center, reach) = state.touched(*id, [x, y], radius)?;
-            Some(reach / state.camera.units_per_pixel(center))
+            let brush = state.posed_models().brush(*id, state.pointer(x, y), radius)?;
+            Some(brush.radius / state.camera.units_per_pixel(brush.center))
         };
         self.posed(radius).ok().flatten()
     }
@@ -188,45 +180,5 @@ impl Engine {
             }
         });
         outcome
-    }
-}
-
-impl State {
-    /// Finds the surface point of a model under the pointer, and the brush radius in object units. `None` if the
-    /// pointer is on another model or on no model.
-    fn touched(&self, id: u32, [x, y]: [f32; 2], radius: f32) -> Option<(Vec3, f32)> {
-        let (at, posed) = (self.pointer(x, y), &self.held.posed);
-        if posed.len() != self.models().positions().len() {
-            return None;
-        }
-        let (triangle, bary) = pick_surface(posed, self.models().shown_triangles(), &self.camera, at)?;
-        let corners = self.models().triangles()[triangle as usize];
-        let center = corners.iter().zip(bary).map(|(&v, share)| share * posed[v as usize]).sum();
-        let reach = radius * self.editor.bounds()?.diagonal();
-        let is_own = self.models().get(id).ok()?.triangles.contains(&(triangle as usize));
-        (is_own && reach > 0.0).then_some((center, reach))
-    }
-
-    /// Paints vertices of a model around the point under the pointer; false if the pointer is not on this model.
-    fn dab(&mut self, id: u32, at: [f32; 2], radius: f32, amount: u8) -> bool {
-        let Some((center, reach)) = self.touched(id, at, radius) else { return false };
-        let Ok(member) = self.models().get(id) else { return false };
-        if amount == 0 && member.painted.is_empty() {
-            return true;
-        }
-        let (n, vertices) = (member.positions().len(), member.vertices.clone());
-        let posed = &self.held.posed[vertices];
-        self.editor.paint(id, |painted| {
-            painted.resize(n, 0);
-            for (painted, at) in painted.iter_mut().zip(posed) {
-                let share =
-                    1.0 - ((at.distance(center) / reach - FULL_SHARE) / (1.0 - FULL_SHARE)).clamp(0.0, 1.0);
-                // Take the maximum or minimum, so that a second dab at the same place changes nothing.
-                let dab =
-                    if amount > 0 { share * f32::from(amount) } else { MAX_AMOUNT * (1.0 - share) } as u8;
-                *painted = if amount > 0 { dab.max(*painted) } else { dab.min(*painted) };
-            }
-        });
-        true
     }
 }

@@ -11,7 +11,9 @@ use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
 use crate::options::decode;
-use crate::surface::SMALL_SIDE;
+
+/// Side of the offscreen texture that is drawn to compile pipelines, pixels.
+const SMALL_SIDE: u32 = 16;
 
 #[wasm_bindgen]
 impl Engine {
@@ -40,18 +42,18 @@ impl Engine {
     /// # Errors
     /// `DeviceLost`. `Gpu` if the GPU refuses a command or runs out of memory.
     #[wasm_bindgen(js_name = drawFrame)]
-    pub fn draw_frame(&self, sharp: bool) -> Result<Option<bool>, JsValue> {
+    pub fn draw_frame(&self, sharp: bool) -> Answer<Option<bool>> {
         let Some(mut gpu) = self.gpu.try_lock() else { return Ok(None) };
         let Some(gpu) = gpu.as_mut() else { return Ok(None) };
         let mut state = self.state.borrow_mut();
         if let Some(fault) = state.fault.take() {
-            return Err(fault.into());
+            return Err(fault);
         }
         gpu.take(&mut state);
         let pixels = (state.size * state.scale).round();
         let (size, scale) = ([pixels.x as u32, pixels.y as u32], state.scale);
         let (surface, sessions) = gpu.shown(&state.shown());
-        Ok(surface.draw(sessions, size, scale, sharp)?)
+        surface.draw(sessions, size, scale, sharp)
     }
 
     /// Draws a small box mesh, bound to itself as its cage, into an offscreen texture. Drivers finish compiling a
@@ -59,24 +61,24 @@ impl Engine {
     ///
     /// # Errors
     /// `DeviceLost`. `Gpu` if the GPU refuses a command or runs out of memory.
-    pub async fn warm(&self) -> Result<(), JsValue> {
+    pub async fn warm(&self) -> Answer<()> {
         let (context, (target, format)) = {
             let gpu = self.gpu.lock().await;
             let gpu = gpu.as_ref().ok_or_else(lost)?;
-            (gpu.main.context().clone(), gpu.surface.small_target(gpu.main.context()))
+            (gpu.main.context().clone(), gpu.surface.parts.target(gpu.main.context(), [SMALL_SIDE; 2]))
         };
         let cage = subdivided_box(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }, 0.0, [1; 3]);
-        let cage = Cage::new(&cage).map_err(Fault::from)?;
+        let cage = Cage::new(&cage)?;
         let n = cage.n_vertices() as u32;
         let identity = Weights::new(n, (0..=n).collect(), (0..n).collect(), vec![1.0; n as usize]);
         let mut session = Session::new(context);
         let model = DrawModel::plain(cage.positions().to_vec(), cage.triangles().to_vec());
-        session.set_model(model).await.map_err(Fault::from)?;
-        session.set_cage(&cage).await.map_err(Fault::from)?;
-        session.adopt(identity.map_err(Fault::from)?, Frames::default()).await.map_err(Fault::from)?;
+        session.set_model(model).await?;
+        session.set_cage(&cage).await?;
+        session.adopt(identity?, Frames::default()).await?;
         session.frame_all();
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(session.frame(&view, format, [SMALL_SIDE; 2], 1.0).map_err(Fault::from)?)
+        Ok(session.frame(&view, format, [SMALL_SIDE; 2], 1.0)?)
     }
 
     /// Waits until uploads in progress have finished. During an upload, the weights of an undone step are missing.
@@ -89,8 +91,8 @@ impl Engine {
     ///
     /// # Errors
     /// If the GPU device is lost, or the picture is too large.
-    pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Result<Vec<u8>, JsValue> {
-        Ok(self.render_picture([width, height], alone, None).await?)
+    pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Answer<Vec<u8>> {
+        self.render_picture([width, height], alone, None).await
     }
 
     /// Renders the model in a saved pose, without the frame of a clip, on a transparent background. RGBA pixels, rows
@@ -100,8 +102,8 @@ impl Engine {
     /// If the GPU device is lost, or the picture is too large. `Missing` if the pose does not exist or fits another cage,
     /// or while the cage is uploaded.
     #[wasm_bindgen(js_name = posePicture)]
-    pub async fn pose_picture(&self, width: u32, height: u32, index: u32) -> Result<Vec<u8>, JsValue> {
-        Ok(self.render_picture([width, height], true, Some(index as usize)).await?)
+    pub async fn pose_picture(&self, width: u32, height: u32, index: u32) -> Answer<Vec<u8>> {
+        self.render_picture([width, height], true, Some(index as usize)).await
     }
 
     /// Reads from the GPU the vertices deformed with one kind of coordinates. `[n_vertices, 3]`
@@ -112,14 +114,14 @@ impl Engine {
     pub async fn read_positions(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
-    ) -> Result<Vec<f32>, JsValue> {
+    ) -> Answer<Vec<f32>> {
         let kind = decode(kind)?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         gpu.take(&mut self.state.borrow_mut());
         let none = || Fault::missing("such coordinates", "compare with them first");
         let session = gpu.shown(&[kind]).1.pop().ok_or_else(none)?;
-        let positions = session.read_positions().await.map_err(Fault::from)?;
+        let positions = session.read_positions().await?;
         self.change(|_| ());
         Ok(flat(&positions))
     }

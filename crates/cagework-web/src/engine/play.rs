@@ -2,21 +2,20 @@
 
 use cagework_core::Controls;
 use cagework_core::enclosure::Enclosure;
-use cagework_core::field::{self, Field, FieldWeights, Lattice};
-use cagework_io::ModelFormat;
+use cagework_core::field::{self, FieldWeights, Lattice};
+use cagework_core::splats::{Outline, outlines};
+use cagework_editor::{Playback, RigOptions};
 use js_sys::Float32Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
 
 use super::{Engine, lost};
-use crate::binder::Offsets;
 use crate::clock::now_ms;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{JsRigOptions, decode};
-use crate::outlines::{Outline, outlines};
-use crate::playing::{ModelMotion, Playback};
+use crate::options::decode;
 use crate::state::State;
+use crate::weights::BoundArrays;
 
 #[wasm_bindgen]
 impl Engine {
@@ -28,8 +27,8 @@ impl Engine {
     pub async fn start_clip(
         &self,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
-    ) -> Result<(), JsValue> {
-        Ok(self.play(decode(options)?, false).await?)
+    ) -> Answer<()> {
+        self.play(decode(options)?, false).await
     }
 
     /// Shows the models at a time of a clip, in seconds; without a clip, at rest. `targets`: weights of the morph
@@ -73,23 +72,19 @@ impl Engine {
         self.read(|state| state.lattice.is_some())
     }
 
-    /// Stores the weights of `Binder.bindLattice`, which deform a model that a clip moves. Arrays as for `adopt`.
+    /// Stores the weights of `Binder.bindLattice`, which deform a model that a clip moves.
     ///
     /// # Errors
     /// Without a cage, or if the arrays do not match a lattice around this cage.
     #[wasm_bindgen(js_name = takeLattice)]
     pub fn take_lattice(
         &self,
-        indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
-        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
-    ) -> Result<(), JsValue> {
+        #[wasm_bindgen(unchecked_param_type = "BoundArrays")] rows: JsValue,
+    ) -> Answer<()> {
         let lattice = self.read(|state| {
             let controls = Controls::from(state.require_set()?);
             let lattice = Lattice::new(controls.surface(), field::CLIP_CELLS);
-            let (weights, frames) =
-                decode::<Offsets>(offsets)?.bound(controls.n_controls(), indptr, indices, data)?;
+            let (weights, frames) = decode::<BoundArrays>(rows)?.bound(controls.n_controls())?;
             if weights.n_rows() != lattice.points().len() {
                 return Err(Fault::new(ErrorName::Error, "the weights are those of another cage's lattice"));
             }
@@ -110,10 +105,11 @@ impl Engine {
     pub fn outlines_at(&self, x: f32, y: f32) -> Vec<f32> {
         let found = self.posed(|state| {
             let models = state.models();
-            let place =
-                state.surface_at(state.pointer(x, y)).and_then(|at| at.at(models, models.positions()));
+            let at = state.posed_models().surface_at(state.pointer(x, y));
+            let place = at.and_then(|at| at.at(models, models.positions()));
             let across = [state.camera.right(), state.camera.up()];
-            let of = |(splats, place)| outlines(splats, state.field().as_ref(), place, across);
+            let field = state.bound_document().field_of_splats();
+            let of = |(splats, place)| outlines(splats, field.as_ref(), place, across);
             models.splats().zip(place).and_then(of)
         });
         let flat = |of: Outline| [of.half_axes.x, of.half_axes.y, of.angle];
@@ -148,12 +144,12 @@ impl Engine {
     /// # Errors
     /// If the models are not bound or cannot be exported, or the GPU runs out of memory. `Cancelled` if models or cage
     /// change during the preparation.
-    async fn play(&self, options: JsRigOptions, is_update: bool) -> Answer<()> {
+    async fn play(&self, options: RigOptions, is_update: bool) -> Answer<()> {
         // Wait, because `playback` reads weights, which fails during an upload.
         self.ready().await;
         let start = now_ms();
         let revision = self.revision();
-        let mut playing = self.playback(options)?;
+        let mut playing = self.read(|state| Playback::new(state.bound_document(), options))?;
         playing.prepared_ms = now_ms() - start;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
@@ -201,54 +197,5 @@ impl Engine {
             }
             engine.announce();
         });
-    }
-
-    /// Prepares playback of the models in the current pose.
-    ///
-    /// # Errors
-    /// If the models cannot be exported, or for `options.dynamic` without a lattice.
-    pub(super) fn playback(&self, options: JsRigOptions) -> Answer<Playback> {
-        let field = if options.dynamic { Some(self.field()?) } else { None };
-        let ids: Vec<u32> = self.read(|state| state.models().iter().map(|member| member.id).collect());
-        let parts =
-            ids.into_iter().map(|id| Ok((id, self.part(id, &options)?))).collect::<Answer<Vec<_>>>()?;
-        Ok(self.read(|state| Playback::new(&state.editor, options, parts, field)))
-    }
-
-    /// Prepares the motion of one model: the motion of its export or, with `dynamic`, of the original file, which the
-    /// cage then deforms.
-    fn part(&self, id: u32, request: &JsRigOptions) -> Answer<ModelMotion> {
-        let is_gltf =
-            self.read(|state| Answer::Ok(state.models().get(id)?.model.format() == ModelFormat::Gltf))?;
-        if is_gltf && !request.dynamic {
-            let bytes = self.posed_glb(id, request)?.0;
-            let player = self.read(|state| Answer::Ok(state.models().get(id)?.model.player_of(&bytes)?))?;
-            return Ok(ModelMotion::Player(Box::new(player)));
-        }
-        if let Some(player) = self.read(|state| Answer::Ok(state.models().get(id)?.model.player()?))? {
-            return Ok(ModelMotion::Player(Box::new(player)));
-        }
-        // A model whose format has no clips has one shape: that of the cage's pose or, for `dynamic`, the rest shape,
-        // which the caller deforms.
-        self.read(|state| {
-            let posed =
-                state.deformed(if request.dynamic { &state.rest().positions } else { state.pose() })?;
-            let own = state.models().get(id)?.share(&posed);
-            Ok(ModelMotion::Still(state.up().turned_back(own).into_owned()))
-        })
-    }
-
-    /// Computes the displacement field of the posed cage.
-    ///
-    /// # Errors
-    /// If the lattice is not available.
-    pub(super) fn field(&self) -> Answer<Field> {
-        self.read(|state| {
-            let Some(lattice) = &state.lattice else {
-                return Err(Fault::missing("lattice", "bind it first"));
-            };
-            let (rest, posed) = (&state.rest().positions, state.pose());
-            Ok(lattice.pose(rest, posed))
-        })
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::view::View as _;
-use cagework_editor::SurfacePoint;
+use cagework_editor::{Grab, SurfacePoint};
 use glam::{Vec2, Vec3};
 use js_sys::{Array, Float64Array, Uint32Array};
 use wasm_bindgen::JsValue;
@@ -11,10 +11,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Answer;
-use crate::held::Grab;
 use crate::options::decode;
 use crate::state::State;
-use crate::views::optional;
+use crate::views::{object, optional};
 
 #[wasm_bindgen]
 impl Engine {
@@ -22,7 +21,7 @@ impl Engine {
     /// during playback.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
-        let found = self.posed(|state| state.surface_at(state.pointer(x, y))).ok().flatten();
+        let found = self.posed(|state| state.posed_models().surface_at(state.pointer(x, y))).ok().flatten();
         optional(found)
     }
 
@@ -34,39 +33,40 @@ impl Engine {
     pub fn place_of(
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
-    ) -> Result<Vec<f32>, JsValue> {
+    ) -> Answer<Vec<f32>> {
         let point = decode(point)?;
-        let place = self.posed(|state| state.place_of(point))?;
+        let place = self.posed(|state| state.posed_models().place_of(point))?;
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
-    /// Returns the weights of the controls at the points of a pull, `[n, n_controls]`, and the nearest vertex of the
-    /// model for each point, or 2^32 - 1 for a vertex of the cage. The points are `grabs`, then all pins except the one
-    /// under the pointer.
+    /// Returns the weights of the bind at the points of a pull, `[n, n_columns]`, the nearest vertex of the model for
+    /// each point, or 2^32 - 1 for a vertex of the cage, and the frames of the bind. The points are `grabs`, then all
+    /// pins except the one under the pointer.
     ///
     /// # Errors
     /// If `grabs` are neither surface points nor vertices. Without weights.
-    #[wasm_bindgen(js_name = gripsOf, unchecked_return_type = "[Float64Array, Uint32Array]")]
+    #[wasm_bindgen(js_name = gripsOf, unchecked_return_type = "[Float64Array, Uint32Array, Frames]")]
     pub fn grips_of(
         &self,
         #[wasm_bindgen(unchecked_param_type = "readonly (SurfacePoint | number)[]")] grabs: JsValue,
         x: f32,
         y: f32,
-    ) -> Result<JsValue, JsValue> {
+    ) -> Answer<JsValue> {
         let grabs: Vec<Grab> = decode(grabs)?;
         let (rows, seeds): (Vec<Vec<f64>>, Vec<u32>) = self.posed(|state| {
-            let pins = state.pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
-            grabs.into_iter().chain(pins).filter_map(|grab| state.grip_of(grab)).unzip()
+            let pins = state.posed_models().pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
+            grabs.into_iter().chain(pins).filter_map(|grab| state.bound_document().grip_of(grab)).unzip()
         })?;
         let rows = Float64Array::from(rows.concat().as_slice());
-        Ok(Array::of2(&rows, &Uint32Array::from(seeds.as_slice())).into())
+        let frames = self.read(|state| Answer::Ok(object(&*state.bound_document().require_bound()?.frames)))?;
+        Ok(Array::of3(&rows, &Uint32Array::from(seeds.as_slice()), &frames).into())
     }
 
     /// Returns the pins after a click. A pin under the pointer is removed. If no pin is there and `may_pin` is set, a
     /// pin is added at the surface point under the pointer. Undefined if nothing changes, or without weights.
     #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
     pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
-        let pins = self.posed(|state| state.pins_after(state.pointer(x, y), may_pin));
+        let pins = self.posed(|state| state.posed_models().pins_after(state.pointer(x, y), may_pin));
         optional(pins.ok().flatten())
     }
 
@@ -79,9 +79,9 @@ impl Engine {
     pub fn image_of(
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
-    ) -> Result<JsValue, JsValue> {
+    ) -> Answer<JsValue> {
         let point = decode(point)?;
-        let image = self.read(|state| state.image_of(point));
+        let image = self.read(|state| state.editor.image_of(point));
         Ok(optional(image))
     }
 
@@ -103,7 +103,7 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "readonly SurfacePoint[]")] points: JsValue,
         target: Option<Vec<f32>>,
-    ) -> Result<(), JsValue> {
+    ) -> Answer<()> {
         let points: Vec<SurfacePoint> = decode(points)?;
         if self.read(|state| state.held.points == points && state.held.target.is_none()) && target.is_none() {
             return Ok(());

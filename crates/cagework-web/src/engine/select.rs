@@ -1,11 +1,12 @@
 //! Methods that pick and select vertices, edges and faces of the cage.
 
-use cagework_editor::edit::{Element, is_covered, pick_edge, pick_face, pick_vertex, vertices_in_box};
+use cagework_editor::edit::vertices_in_box;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::flat;
+use crate::error::Answer;
 use crate::options::decode;
 use crate::state::State;
 
@@ -16,10 +17,7 @@ impl Engine {
     /// # Errors
     /// If the tools are invalid.
     #[wasm_bindgen(js_name = setTools)]
-    pub fn set_tools(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "Tools")] tools: JsValue,
-    ) -> Result<(), JsValue> {
+    pub fn set_tools(&self, #[wasm_bindgen(unchecked_param_type = "Tools")] tools: JsValue) -> Answer<()> {
         let tools = decode(tools)?;
         self.change(|state| {
             state.editor.set_tools(tools, &state.camera);
@@ -32,12 +30,14 @@ impl Engine {
     /// `radius` CSS pixels of the pointer, or the face under the pointer. Empty if there is none. Vertices that the model
     /// covers are not picked.
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
-        let picked = self.pick_on_cage(x, y, radius);
-        if matches!(picked[..], [vertex] if self.is_covered(vertex, [x, y], radius)) {
-            Vec::new()
-        } else {
-            picked
-        }
+        let picked = self.read(|state| {
+            let (at, sees_back) = (state.pointer(x, y), !state.pulls());
+            let picked = || state.editor.pick(state.element(), &state.camera, at, radius, sees_back);
+            if state.has_cage_in_view() { picked() } else { Vec::new() }
+        });
+        let covers =
+            |vertex| self.posed(|state| state.posed_models().covers(vertex, state.pointer(x, y), radius));
+        if matches!(picked[..], [vertex] if covers(vertex).unwrap_or(false)) { Vec::new() } else { picked }
     }
 
     /// Highlights the cage element with these vertices.
@@ -58,7 +58,7 @@ impl Engine {
         &self,
         vertices: &[u32],
         #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
-    ) -> Result<(), JsValue> {
+    ) -> Answer<()> {
         let mode = decode(mode)?;
         self.change_selection(|state| state.editor.selection.change(vertices, mode));
         Ok(())
@@ -76,7 +76,7 @@ impl Engine {
         x1: f32,
         y1: f32,
         #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
-    ) -> Result<(), JsValue> {
+    ) -> Answer<()> {
         let mode = decode(mode)?;
         self.change_selection(|state| {
             let corners = [state.pointer(x0, y0), state.pointer(x1, y1)];
@@ -107,39 +107,6 @@ impl Engine {
     #[wasm_bindgen(js_name = selectionCenter)]
     pub fn selection_center(&self) -> Vec<f32> {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
-    }
-
-    /// The cage element under the pointer, drawn in front of the model or behind it.
-    fn pick_on_cage(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
-        self.read(|state| {
-            if !state.has_cage_in_view() {
-                return Vec::new();
-            }
-            let (at, positions, topology, view) =
-                (state.pointer(x, y), state.pose(), state.editor.topology(), &state.camera);
-            match state.element() {
-                Element::Vertex => {
-                    pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
-                }
-                Element::Edge => pick_edge(positions, topology, view, at, radius)
-                    .map(|e| topology.edges[e as usize].to_vec())
-                    .unwrap_or_default(),
-                Element::Face => pick_face(positions, topology, view, at)
-                    .map(|f| topology.faces[f as usize].clone())
-                    .unwrap_or_default(),
-            }
-        })
-    }
-
-    /// Whether the posed model covers the vertex; false if the models are not bound.
-    fn is_covered(&self, vertex: u32, [x, y]: [f32; 2], radius: f32) -> bool {
-        let covered = self.posed(|state| {
-            let surface = state.surface_at(state.pointer(x, y)).and_then(|point| state.place_of(point));
-            let topology = state.editor.topology();
-            let covers = |surface| is_covered(vertex, state.pose(), topology, &state.camera, radius, surface);
-            surface.is_some_and(covers)
-        });
-        covered.unwrap_or(false)
     }
 
     fn change_selection(&self, change: impl FnOnce(&mut State)) {

@@ -2,20 +2,22 @@
 
 use std::sync::Arc;
 
+use cagework_core::Controls;
 use cagework_core::slice::Slice;
-use cagework_core::{Controls, Weights};
+use cagework_editor::PageBindOptions;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Answer;
-use crate::options::{JsBindOptions, decode};
+use crate::options::decode;
+use crate::weights::BoundArrays;
 
 #[wasm_bindgen]
 impl Engine {
     /// Shows one layer of grid cells, normal to `axis` (0 to 2) at `fraction` (0 to 1) of the grid's length along it.
-    /// `options` determine the grid. The arrays are the weights that `Binder.bindSlice` returned; they are empty if no
-    /// cell of the layer is inside the cage.
+    /// `options` determine the grid. `rows`: the weights that `Binder.bindSlice` returned; undefined if no cell of the
+    /// layer is inside the cage.
     ///
     /// # Errors
     /// Without a cage, or if the number of weights does not match the slice.
@@ -25,21 +27,15 @@ impl Engine {
         axis: usize,
         fraction: f32,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
-        indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
-    ) -> Result<(), JsValue> {
-        let request: JsBindOptions = decode(options)?;
+        #[wasm_bindgen(unchecked_param_type = "BoundArrays | undefined")] rows: JsValue,
+    ) -> Answer<()> {
+        let request: PageBindOptions = decode(options)?;
+        let rows: Option<BoundArrays> = decode(rows)?;
         let slice = self.read(|state| {
             let set = state.require_set()?;
             let mut slice = Slice::new(set, &request.options, axis.min(2), fraction);
-            if !data.is_empty() {
-                slice.set_weights(Weights::new(
-                    Controls::from(set).n_controls() as u32,
-                    indptr,
-                    indices,
-                    data,
-                )?)?;
+            if let Some(rows) = rows {
+                slice.set_weights(rows.bound(Controls::from(set).n_controls())?.0)?;
             }
             Answer::Ok(slice)
         })?;

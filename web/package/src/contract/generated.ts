@@ -7,7 +7,11 @@ export type Backend = "cpu" | "gpu";
 /**
  * Options of a bind, and the processor that it runs on.
  */
-export type BindOptions = { backend: Backend,
+export type BindOptions = {
+/**
+ * The processor.
+ */
+backend: Backend,
 /**
  * Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
  * Default 64.
@@ -204,21 +208,74 @@ ambiguous_cells: number,
  */
 notices: Array<string>, };
 /**
- * Lower and upper corner of an axis-aligned box.
+ * Weights as compressed sparse rows. `offsets` describes the columns after the columns of the controls.
  */
-export type Bounds = { min: [number, number, number], max: [number, number, number], };
+export type BoundArrays = {
 /**
- * A cage that the page opens.
+ * Start of each row. `[n_rows + 1]`
  */
-export type CageContents = {
+indptr: Uint32Array,
 /**
- * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+ * Column of each weight: controls first, then frames. `[n_nonzeros]`
+ */
+indices: Uint32Array,
+/**
+ * Weights that are not 0. `[n_nonzeros]`
+ */
+data: Float32Array, offsets: Offsets, };
+/**
+ * Axis-aligned bounding box, in object units.
+ */
+export type Bounds = {
+/**
+ * Corner with the smallest coordinates.
+ */
+min: [number, number, number],
+/**
+ * Corner with the largest coordinates.
+ */
+max: [number, number, number], };
+/**
+ * A built-in sample: model, cage and poses.
+ */
+export type BuiltSample = {
+/**
+ * The model as a GLB file.
+ */
+glb: Uint8Array,
+/**
+ * Vertices of the model. `[n_vertices, 3]`
+ */
+positions: Float32Array, cage: CageArrays, poses: Array<PoseArrays>,
+/**
+ * Point of the model that the page asks the user to pull first, object units.
+ */
+grip: [number, number, number], };
+/**
+ * A cage as arrays, and what its generator says about it.
+ */
+export type CageArrays = {
+/**
+ * Cage vertices, then controls inside the cage. `[n_controls, 3]`
  */
 positions: Float32Array,
 /**
- * For each face, the number of its corners, then the vertex index of each corner.
+ * For each face, the number of its corners and then their vertices.
  */
-corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
+corners: Uint32Array,
+/**
+ * Subdivision and interior controls. Undefined for a new cage. The document then keeps its interior controls, as
+ * far as they fit into the new cage.
+ */
+controls?: CageControls | undefined,
+/**
+ * Number of separate parts of the model that a generated cage joins; 0 if it joins none.
+ */
+bridged?: number,
+/**
+ * Sentences about gaps of the model that a generated cage closes, with settings that would keep the gaps open.
+ */
+notices?: Array<string>, };
 /**
  * Subdivision and inner controls of a cage.
  */
@@ -246,7 +303,7 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
 /**
  * Number of quads among the faces.
  */
-quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+quads: number, bounds: Bounds, notices: Array<string>, };
 /**
  * Options of [`super::generate`]. Serde aliases are names in older project files.
  */
@@ -291,13 +348,17 @@ voxels: number, };
 /**
  * The cage's properties, and its interior controls.
  */
-export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
+export type CageState = {
+/**
+ * Whether the cage is valid; otherwise it is a draft.
+ */
+usable: boolean, info: CageInfo, controls: CageControls,
 /**
  * Radius of interior point and line controls, object units.
  */
 radius: number, };
 /**
- * Position and direction of the camera.
+ * Position, direction and projection of a camera, as links contain them.
  */
 export type CameraView = {
 /**
@@ -333,14 +394,6 @@ exterior: number, };
  * Cell shape of the classic method.
  */
 export type CellShape = "box" | "cubic";
-/**
- * Name and duration of an animation clip, for the list of clips.
- */
-export type ClipView = {
-/**
- * Name of the clip, or its number if it has no name.
- */
-name: string, seconds: number, };
 /**
  * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
@@ -554,6 +607,18 @@ export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "Weig
  */
 export type Feet = "free" | "lock";
 /**
+ * A remedy for a problem.
+ */
+export type Fix = { "kind": "repair",
+/**
+ * The repair to apply.
+ */
+repair: Repair, } | { "kind": "grid",
+/**
+ * Number of cells with which no measured part is thinner than a cell.
+ */
+cells: number, };
+/**
  * Columns of a bind's weights that follow those of its controls.
  */
 export type Frames = {
@@ -607,6 +672,44 @@ export type GizmoMode = "move" | "rotate" | "scale";
  * A handle of a gizmo.
  */
 export type GizmoPart = { "axis": number } | { "plane": number } | "view";
+/**
+ * Start of a pull.
+ */
+export type GrabInput = {
+/**
+ * Current pose of the cage and of the controls inside it. `[n_controls, 3]`
+ */
+start: Float32Array,
+/**
+ * Weights of the grabbed points, then of the pinned points. `[n_grabs + n_pins, n_controls]`
+ */
+rows: Float64Array,
+/**
+ * For each row of `rows`, the model vertex nearest to the point; 2^32 - 1 if the point is a cage vertex.
+ * `[n_grabs + n_pins]`
+ */
+seeds: Uint32Array,
+/**
+ * Number of grabbed points.
+ */
+grabs: number, options: Partial<DragOptions>, };
+/**
+ * Result of starting a pull: the grabbed points, and which part of the model the pull moves.
+ */
+export type GrabResult = {
+/**
+ * Positions of the grabbed points in the pose `start`. `[n_grabs, 3]`
+ */
+place: Float32Array,
+/**
+ * How strongly the pull keeps each model vertex in place, 0 to 1. `[n_vertices]`
+ */
+stays: Float32Array,
+/**
+ * Distance along the surface within which the pull moves the model, as a fraction of the model's size. Infinite if
+ * the pull moves the whole model.
+ */
+reach: number, };
 /**
  * An element of inner controls: indices into [`InnerControls::positions`].
  */
@@ -680,10 +783,6 @@ estimated: number,
  */
 peak: number, };
 /**
- * Action of the button that fixes a fault.
- */
-export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
-/**
  * Discretisation of the cage.
  */
 export type Method = "classic" | "embedded";
@@ -706,7 +805,7 @@ splats: number,
 /**
  * Number of points of a point cloud, otherwise 0.
  */
-points: number, skins: number, joints: number, clips: Array<ClipView>,
+points: number, skins: number, joints: number, clips: Array<SharedClip>,
 /**
  * Morph targets of all models, and their weights at rest.
  */
@@ -756,11 +855,11 @@ sample: string | null,
 /**
  * JSON of the page's settings in a project.
  */
-settings: string | null, cage: CageContents | null,
+settings: string | null, cage: CageArrays | null,
 /**
  * Poses of a sample. The poses of a project are in its `LoadedModel`.
  */
-poses: Array<PoseContents>, };
+poses: Array<PoseArrays>, };
 /**
  * Treatment of mesh vertices outside the cage.
  */
@@ -802,9 +901,29 @@ stays: Array<string>, };
  */
 export type Pivot = "middle" | "border" | "last";
 /**
+ * Locations of a problem: indices into the checked mesh, and points in object units.
+ */
+export type Places = {
+/**
+ * Cage vertices; for [`Code::ModelOutside`] vertices of the model.
+ */
+vertices: Array<number>,
+/**
+ * Pairs of cage vertices.
+ */
+edges: Array<[number, number]>,
+/**
+ * Cage faces.
+ */
+faces: Array<number>,
+/**
+ * Points in space, object units.
+ */
+points: Array<[number, number, number]>, };
+/**
  * A saved pose of the cage and the name that the list of poses shows.
  */
-export type PoseContents = { name: string,
+export type PoseArrays = { name: string,
 /**
  * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
  */
@@ -838,17 +957,70 @@ hash: number, };
  */
 export type Preconditioner = "none" | "v_cycle";
 /**
- * Faults of one kind in a cage: their number, and the best fix.
+ * All occurrences of one kind of problem.
  */
-export type Problem = { code: Code, severity: Severity,
+export type Problem = {
 /**
- * Message of one or more complete sentences.
+ * Kind of the problem.
  */
-message: string, count: number, fix: Mend | null, };
+code: Code,
 /**
- * A [`ProgressEvent`] as JavaScript receives it.
+ * Whether the problem prevents binding, may spoil the results, or is harmless.
  */
-export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
+severity: Severity,
+/**
+ * Number of occurrences, including those that `places` does not list.
+ */
+count: number,
+/**
+ * Locations of the occurrences; each of the four lists has at most [`MAX_PLACES`] entries.
+ */
+places: Places,
+/**
+ * Description, one sentence.
+ */
+message: string,
+/**
+ * Remedies, best first; empty if the user has to decide.
+ */
+fixes: Array<Fix>, };
+/**
+ * Progress of a bind or of cage generation, passed to [`Progress::report`].
+ */
+export type Progress = {
+/**
+ * Stage that is in progress.
+ */
+stage: Stage,
+/**
+ * Completed share of the whole work, 0 to 1.
+ */
+fraction: number,
+/**
+ * Number of iterations of the solver in this stage: sweeps, V-cycles or steps.
+ */
+iteration: number,
+/**
+ * Latest delta of the solver, which it compares with its tolerance ([`crate::solve::stop`]); `None` if the stage
+ * has none.
+ */
+delta: number | null, };
+/**
+ * One frame of a pull.
+ */
+export type PullFrame = {
+/**
+ * Pose of the cage. `[n_controls, 3]`
+ */
+cage: Float32Array,
+/**
+ * True once further frames would not change the pose.
+ */
+settled: boolean,
+/**
+ * Largest distance of a grabbed or pinned point from its target, as a fraction of the model's size.
+ */
+error: number, };
 /**
  * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
  * exactly, so with the embedded method this error is that of the solver.
@@ -1024,6 +1196,18 @@ export type Severity = "error" | "warning" | "note";
  * Shape that the cage follows.
  */
 export type Shape = "follow" | "hull";
+/**
+ * Clips with the same name, of all models that have one.
+ */
+export type SharedClip = {
+/**
+ * Name of the clip, or its number if it has no name.
+ */
+name: string,
+/**
+ * Duration of the longest of these clips, seconds.
+ */
+seconds: number, };
 /**
  * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
  */

@@ -106,7 +106,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       const input = { positions, triangles, model: engine.modelPositions(), options, smooth: 0 };
       cage = await run(client.run("cage", input, ({ fraction }) => hear("Making a cage", fraction)));
     }
-    engine.setCage(cage.positions, cage.corners, cage.controls, [], undefined);
+    engine.setCage({ ...cage, notices: [] }, undefined);
     engine.frameAll();
     if (bound) {
       const { indptr, indices, data, offsets } = bound.weights;
@@ -122,11 +122,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
         adapter,
         options: { ...BIND_DEFAULTS, grid, backend },
         listener: (event) => event.kind === "progress" && hear("Binding", event.fraction),
-        cage: () => ({
-          positions: engine.restPositions(),
-          corners: engine.cageCorners(),
-          controls: engine.cageControls(),
-        }),
+        cage: () => engine.cageArrays(),
       }),
     );
     return { model: engine.modelInfo(), report };

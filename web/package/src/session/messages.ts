@@ -3,15 +3,16 @@
 import type {
   BindOptions,
   BindReport,
+  BoundArrays,
   CageArrays,
   CageOptions,
-  Check,
   CheckedCage,
   Coordinates,
   GrabInput,
   GrabResult,
   NamedFile,
-  Offsets,
+  PoseArrays,
+  Problem,
   Progress,
   PullFrame,
   Reading,
@@ -42,26 +43,18 @@ export interface ReadModel {
   readonly vertices: number;
 }
 
-/** Weights as compressed sparse rows. `offsets` describes the columns after the columns of the controls. */
-export interface BoundArrays {
-  readonly indptr: Uint32Array;
-  readonly indices: Uint32Array;
-  readonly data: Float32Array;
-  readonly offsets: Offsets;
-  readonly report: BindReport | undefined;
-}
-
 /** Sparse rows whose columns and weights stay in the worker until the job `rows` has fetched the last of them. */
 export type KeptRows = Omit<BoundArrays, "indices" | "data"> & {
   /** Number of this bind, for `rows`. */
   readonly key: number;
+  readonly report: BindReport | undefined;
 };
 
 export interface SampleArrays {
   readonly read: ReadModel;
-  readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
+  readonly poses: readonly PoseArrays[];
   /** Point of the model that the page suggests to pull first, object units. */
-  readonly grip: Float32Array;
+  readonly grip: readonly number[];
 }
 
 /** Input, progress and output of each job. */
@@ -70,7 +63,7 @@ export interface Jobs {
     /** The last `extra` positions are points of the model's rig, such as joints, instead of vertices. */
     input: { positions: Float32Array; extra: number; cage: CageArrays; options: BindOptions };
     step: Progress;
-    output: BoundArrays;
+    output: BoundArrays & { readonly report: BindReport | undefined };
   };
   /** Like `bind`, but the worker keeps columns and weights for `rows`. */
   bindKept: { input: Jobs["bind"]["input"]; step: Progress; output: KeptRows };
@@ -157,7 +150,7 @@ export interface Jobs {
     step: Reading;
     output: CheckedCage;
   };
-  check: { input: { cage: CageArrays; model: Float32Array }; step: never; output: Check };
+  check: { input: { cage: CageArrays; model: Float32Array }; step: never; output: readonly Problem[] };
   repair: {
     input: { kind: Repair; cage: CageArrays; model: Float32Array };
     step: never;

@@ -1,7 +1,7 @@
 /** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
-import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
-import type { BuiltSample, LoadedModel, Polygons } from "../pkg/cagework";
+import type { BuiltSample, CageArrays, CheckedCage, Reading } from "../contract";
+import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
@@ -106,32 +106,10 @@ export async function readCage(
   return checked(pkg, loaded.asCage(), model, smooth);
 }
 
-/**
- * Copies a cage to arrays and checks it. `smooth`: number of subdivision steps if the cage has no controls of its own.
- */
-export function checked(pkg: Package, cage: Polygons, model: Float32Array, smooth = 0): CheckedCage {
-  const arrays = polygons(cage);
-  const controls = arrays.controls ?? { smooth, inner: 0, elements: [], radius: null };
-  return { ...arrays, check: check(pkg, { ...arrays, controls }, model) };
-}
-
-/** Checks a cage against the model's vertices. */
-export function check(
-  pkg: Package,
-  { positions, corners, controls }: CageArrays,
-  model: Float32Array,
-): Check {
-  const found = pkg.Binder.checkCage(model, positions, corners, controls);
-  const { problems, vertices, edges, faces, points, outside } = found;
-  found.free();
-  return { problems, vertices, edges, faces, points, outside };
-}
-
-/** Copies a polygon mesh to arrays and frees its wasm memory. */
-export function polygons(mesh: Polygons): CageArrays {
-  const { positions, corners, controls } = mesh;
-  mesh.free();
-  return { positions, corners, controls };
+/** Checks a cage. `smooth`: number of subdivision steps if the cage has no controls of its own. */
+export function checked(pkg: Package, cage: CageArrays, model: Float32Array, smooth = 0): CheckedCage {
+  const controls = cage.controls ?? { smooth, inner: 0, elements: [], radius: null };
+  return { ...cage, check: pkg.Binder.checkCage(model, { ...cage, controls }) };
 }
 
 export async function read(

@@ -5,7 +5,6 @@ import type { Binder, BindResult, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { named } from "./client";
 import {
-  type BoundArrays,
   buffers,
   type JobKind,
   type Jobs,
@@ -13,7 +12,7 @@ import {
   type WorkerReply,
   type WorkerRequest,
 } from "./messages";
-import { check, checked, copyRig, read, readCage, readModel, readSample } from "./reading";
+import { checked, copyRig, read, readCage, readModel, readSample } from "./reading";
 
 /** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
@@ -103,10 +102,14 @@ function createWork(pkg: Package): Work {
     { positions, extra, cage, options }: Jobs["bind"]["input"],
     step: (step: Progress) => boolean,
   ): Promise<BindResult> => {
-    return binder().bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step);
+    return binder().bind(positions, extra, cage, options, step);
   };
   return {
-    bind: async (input, step) => taken(await bind(input, step)),
+    async bind(input, step) {
+      const bound = await bind(input, step);
+      const { report } = bound;
+      return { ...bound.intoArrays(), report };
+    },
     async bindKept(input, step) {
       kept?.free();
       kept = undefined;
@@ -125,9 +128,7 @@ function createWork(pkg: Package): Work {
       }
       return rows;
     },
-    async formula({ kind, positions, cage }) {
-      return taken(binder().bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
-    },
+    formula: async ({ kind, positions, cage }) => binder().bindByFormula(kind, positions, cage).intoArrays(),
     async model({ files, states, clip }, step) {
       const loaded = await read(pkg, files, step);
       try {
@@ -141,69 +142,40 @@ function createWork(pkg: Package): Work {
       const loaded = await read(pkg, files, step);
       try {
         loaded.seeFrom(origin);
-        const { positions, corners, controls } = cage;
-        return await binder().reshape(loaded, positions, corners, controls, posed, options, rig, step);
+        return await binder().reshape(loaded, cage, posed, options, rig, step);
       } finally {
         loaded.free();
       }
     },
     async slice({ cage, axis, fraction, options }, step) {
-      const { positions, corners, controls } = cage;
-      const bound = await binder().bindSlice(positions, corners, controls, axis, fraction, options, step);
-      return bound && taken(bound);
+      const bound = await binder().bindSlice(cage, axis, fraction, options, step);
+      return bound?.intoArrays();
     },
     async lattice({ cage, cells, options }, step) {
-      const { positions, corners, controls } = cage;
-      return taken(await binder().bindLattice(positions, corners, controls, cells, options, step));
+      return (await binder().bindLattice(cage, cells, options, step)).intoArrays();
     },
     async cage({ positions, triangles, model, options, smooth }, step) {
       const cage = binder().generateCage(positions, triangles, options, smooth, step);
-      const { bridged, notices } = cage;
-      return { ...checked(pkg, cage, model, smooth), bridged, notices };
+      return checked(pkg, cage, model, smooth);
     },
     read: (input, step) => readModel(pkg, input, step),
     copyRig: (input, step) => copyRig(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
-    check: async ({ cage, model }) => check(pkg, cage, model),
-    async repair({ kind, cage, model }) {
-      const { positions, corners, controls } = cage;
-      return checked(
-        pkg,
-        pkg.Binder.repairCage(kind, model, positions, corners, controls),
-        model,
-        controls?.smooth,
-      );
-    },
-    carry: async ({ model, cage, old, poses }) =>
-      pkg.Binder.carryPoses(model, cage, old.positions, old.corners, old.controls, poses),
+    check: async ({ cage, model }) => pkg.Binder.checkCage(model, cage),
+    repair: async ({ kind, cage, model }) =>
+      checked(pkg, pkg.Binder.repairCage(kind, model, cage), model, cage.controls?.smooth),
+    carry: async ({ model, cage, old, poses }) => pkg.Binder.carryPoses(model, cage, old, poses),
     async pullOpen({ positions, triangles, cage }) {
       puller?.free();
       puller = undefined;
-      puller = new pkg.Puller(positions, triangles, cage.positions, cage.corners, cage.controls);
+      puller = new pkg.Puller(positions, triangles, cage);
       return null;
     },
-    async pullGrab({ start, rows, seeds, grabs, options }) {
-      const by = opened();
-      const place = by.grab(start, rows, seeds, grabs, options);
-      return { place, stays: by.stays(), reach: by.reach };
-    },
-    async pullFrame({ to }) {
-      const by = opened();
-      return { cage: by.frame(to), settled: by.settled, error: by.error };
-    },
+    pullGrab: async (input) => opened().grab(input),
+    pullFrame: async ({ to }) => opened().frame(to),
     async sample({ id, name }) {
       const sample = pkg.Binder.buildSample(id);
-      const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
-      const output = { read: await readSample(pkg, name, sample), poses, grip: sample.grip };
-      sample.free();
-      return output;
+      return { read: await readSample(pkg, name, sample), poses: sample.poses, grip: sample.grip };
     },
   };
-}
-
-/** Copies the arrays of a bind and frees its wasm memory. */
-function taken(bound: BindResult): BoundArrays {
-  const { indptr, indices, data, offsets, report } = bound;
-  bound.free();
-  return { indptr, indices, data, offsets, report };
 }
