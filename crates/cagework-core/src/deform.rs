@@ -84,16 +84,21 @@ pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Ve
 
 /// Error of a pose that moves a point beyond the range of 32-bit floats.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error(
-    "the pose moves point {point} to {:?}, but 32-bit floats end at {:e}: use smaller coordinates",
-    .to.to_array(),
-    f32::MAX
-)]
+#[error("the pose moves point {point} to {:?}{}", .to.to_array(), range_in_words(*.to))]
 pub struct NonFinitePoint {
     /// Index of the point.
     pub point: usize,
     /// Position with a coordinate that is infinite or NaN.
     pub to: Vec3,
+}
+
+/// What follows a position that is not finite in the message of [`NonFinitePoint`].
+fn range_in_words(to: Vec3) -> String {
+    if to.to_array().iter().any(|x| x.is_infinite()) {
+        format!(", but 32-bit floats end at {:e}: use smaller coordinates", f32::MAX)
+    } else {
+        ": the coordinates of the pose must be finite numbers".to_owned()
+    }
 }
 
 /// Computes the positions of bound points, like [`deform_bound`], and checks that they are finite. Meant for poses that
@@ -187,6 +192,9 @@ mod tests {
         assert_eq!(far(f32::MAX).unwrap()[1], Vec3::X * f32::MAX);
         let message = "the pose moves point 1 to [inf, NaN, NaN], but 32-bit floats end at 3.4028235e38: use smaller coordinates";
         assert_eq!(far(f32::INFINITY).unwrap_err().to_string(), message);
+        let message =
+            "the pose moves point 1 to [NaN, NaN, NaN]: the coordinates of the pose must be finite numbers";
+        assert_eq!(far(f32::NAN).unwrap_err().to_string(), message);
     }
 
     #[test]

@@ -34,6 +34,24 @@ pub fn number(x: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
+/// Formats a size in whole MiB, KiB or bytes, whichever fits first, rounded up: `4 MiB`. For memory that is needed.
+pub fn size_rounded_up(bytes: u64) -> String {
+    size(bytes, u64::div_ceil)
+}
+
+/// Like [`size_rounded_up`], rounded down. For limits.
+pub fn size_rounded_down(bytes: u64) -> String {
+    size(bytes, |bytes, unit| bytes / unit)
+}
+
+fn size(bytes: u64, divide: impl Fn(u64, u64) -> u64) -> String {
+    match bytes {
+        0..0x400 => counted(bytes as usize, "byte", "bytes"),
+        0x400..0x10_0000 => format!("{} KiB", divide(bytes, 0x400)),
+        _ => format!("{} MiB", divide(bytes, 0x10_0000)),
+    }
+}
+
 /// Formats a length with three significant digits.
 pub fn three_digits(length: f32) -> String {
     let after_point = 2.0 - length.log10().floor();
@@ -45,7 +63,22 @@ pub fn three_digits(length: f32) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{decimals, number, three_digits};
+    use super::{decimals, number, size_rounded_down, size_rounded_up, three_digits};
+
+    #[test]
+    fn sizes_below_a_mebibyte_are_not_zero() {
+        for (bytes, up, down) in [
+            (0, "0 bytes", "0 bytes"),
+            (1, "1 byte", "1 byte"),
+            (1023, "1,023 bytes", "1,023 bytes"),
+            (1025, "2 KiB", "1 KiB"),
+            (1 << 20, "1 MiB", "1 MiB"),
+            ((1 << 20) + 1, "2 MiB", "1 MiB"),
+            (4 << 30, "4096 MiB", "4096 MiB"),
+        ] {
+            assert_eq!((size_rounded_up(bytes).as_str(), size_rounded_down(bytes).as_str()), (up, down));
+        }
+    }
 
     #[test]
     fn whole_numbers_have_no_decimals() {

@@ -4,6 +4,7 @@ use cagework_core::options::Solver;
 use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::stencil::REDUCE_VALUES;
+use cagework_core::words::{size_rounded_down, size_rounded_up};
 use thiserror::Error;
 
 /// Bytes of a quad: the values of a row in four columns.
@@ -44,8 +45,8 @@ pub enum PlanError {
     },
     /// The total exceeds the memory limit.
     #[error(
-        "the GPU would need {} MiB for this bind, more than the limit of {} MiB: use a smaller grid or raise the limit",
-        needed >> 20, limit >> 20
+        "the GPU would need {} for this bind, more than the limit of {}: use a smaller grid or raise the limit",
+        size_rounded_up(*needed), size_rounded_down(*limit)
     )]
     Memory {
         /// Memory that a bind with the smallest batches needs, bytes.

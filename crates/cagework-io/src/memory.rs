@@ -1,13 +1,14 @@
 //! Memory limits, checked before allocation: a small file can declare huge arrays.
 
+use cagework_core::words::{size_rounded_down, size_rounded_up};
 use thiserror::Error;
 
 /// A file needs more memory than the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
-    "it needs about {} MiB of memory, more than the limit of {} MiB: use a smaller model or raise the limit",
-    needed.div_ceil(MIB),
-    limit.div_ceil(MIB)
+    "it needs about {} of memory, more than the limit of {}: use a smaller model or raise the limit",
+    size_rounded_up(*needed),
+    size_rounded_down(*limit)
 )]
 pub struct MemoryError {
     /// Estimate of the memory that is needed, bytes.

@@ -31,7 +31,7 @@ def test_clothes_and_report_are_identical_to_those_of_the_command(dressing, opti
 def test_errors_name_the_file(dressing):
     with pytest.raises(cw.ModelError, match="suit.obj has no skin"):
         cw.transfer(dressing / "suit.obj", dressing / "suit.obj")
-    with pytest.raises(cw.ModelError, match="more than the limit of 1 MiB"):
+    with pytest.raises(cw.ModelError, match="more than the limit of 1,000 bytes"):
         cw.transfer(dressing / "body.glb", dressing / "suit.obj", memory_limit=1000)
     with pytest.raises(cw.OptionError, match="push_out is -1; it must be a positive distance"):
         cw.transfer(dressing / "body.glb", dressing / "suit.obj", push_out=-1)

@@ -25,7 +25,7 @@ use crate::options::{BindOptions, RangeError};
 use crate::progress::{Cancellation, Progress};
 use crate::report::BindReport;
 use crate::weights::Weights;
-use crate::words::{counted, grouped};
+use crate::words::{counted, grouped, size_rounded_down, size_rounded_up};
 
 /// The result of a bind.
 #[derive(Clone, Debug)]
@@ -59,8 +59,8 @@ pub enum BindError {
     },
     /// The bind exceeds the memory limit.
     #[error(
-        "binding needs about {} MiB, more than the limit of {} MiB: use a smaller grid or raise the limit",
-        needed >> 20, limit >> 20
+        "binding needs about {}, more than the limit of {}: use a smaller grid or raise the limit",
+        size_rounded_up(*needed), size_rounded_down(*limit)
     )]
     Memory {
         /// Memory needed, bytes.
@@ -70,9 +70,9 @@ pub enum BindError {
     },
     /// The bind exceeds the memory limit, mostly by the weights, which do not depend on the grid.
     #[error(
-        "binding needs about {} MiB, more than the limit of {} MiB, most of it for the weights of {} points, one for each of \
+        "binding needs about {}, more than the limit of {}, most of it for the weights of {} points, one for each of \
          {columns} cage vertices: use a cage with fewer vertices or raise the limit",
-        needed >> 20, limit >> 20, grouped(*points)
+        size_rounded_up(*needed), size_rounded_down(*limit), grouped(*points)
     )]
     WeightsMemory {
         /// Memory needed, bytes.

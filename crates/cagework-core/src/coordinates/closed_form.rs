@@ -6,6 +6,7 @@ use thiserror::Error;
 use crate::cage::Cage;
 use crate::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
+use crate::words::{size_rounded_down, size_rounded_up};
 
 /// Function that computes the vectors for the columns of the cage's triangles from posed vertices. `[n_triangles]`
 type PoseTriangles = fn(&Cage, &[Vec3]) -> Vec<Vec3>;
@@ -51,9 +52,9 @@ pub enum ClosedFormError {
     },
     /// The weights exceed the memory limit.
     #[error(
-        "the coordinates need about {} MiB of memory, more than the limit of {} MiB: use a smaller model or raise the limit",
-        needed.div_ceil(1 << 20),
-        limit.div_ceil(1 << 20)
+        "the coordinates need about {} of memory, more than the limit of {}: use a smaller model or raise the limit",
+        size_rounded_up(*needed),
+        size_rounded_down(*limit)
     )]
     Memory {
         /// Memory needed, bytes.
