@@ -2,7 +2,8 @@
 //! moves vertices of one surface inside another ([`push_out`]).
 //!
 //! A vertex takes the values of the closest point if that point is near and faces the same way. The values of all other
-//! vertices minimise the squared graph Laplacian, so that they continue those of their neighbours smoothly.
+//! vertices minimise the squared graph Laplacian, so that they continue those of their neighbours smoothly. If the faces
+//! of one surface point inwards, so that most near points face the opposite way, the normals of the target are negated.
 //!
 //! Source: Abdrashitov, Raichstat, Monsen and Hill 2023, "Robust Skin Weights Transfer via Weight Inpainting". Two
 //! things differ. An edge has the weight 1/length instead of cotangents, so degenerate triangles and edges of three
@@ -24,6 +25,9 @@ use tree::{Hit, TriangleTree};
 pub const REACH: f32 = 0.025;
 /// Cosine of the largest angle between their normals: 30 degrees, as in the paper.
 const MIN_COSINE: f32 = 0.866;
+/// The normals of the target are negated if this many times more positions fit the source with negated normals. The inner
+/// and outer side of a lining fit about equally often.
+const MIN_OPPOSITE_RATIO: usize = 3;
 /// Largest thickness of a cloth, as a fraction of the source's diagonal.
 const MAX_THICKNESS: f32 = 0.015;
 /// Largest cosine between the normals of the two sides of a cloth.
@@ -60,6 +64,7 @@ pub struct Inpainting {
     is_free: Vec<bool>,
     graph: Graph,
     origins: Origins,
+    is_turned: bool,
 }
 
 impl Inpainting {
@@ -68,20 +73,27 @@ impl Inpainting {
     #[must_use]
     pub fn new(source: &TriMesh, target: &TriMesh) -> Self {
         let (source_seams, _, source_normals) = welded(source);
-        let (seams, cloth, normals) = welded(target);
+        let (seams, cloth, mut normals) = welded(target);
         let TriMesh { positions, triangles } = &cloth;
         let size = Bounds::of(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
         let cosine = |a: Vec3, b: Vec3| a.normalize_or_zero().dot(b);
 
         let tree = TriangleTree::new(source);
         let hits = map_indices(positions.len(), |v| tree.closest(positions[v]));
-        let is_match = |(v, hit): (usize, &Option<Hit>)| {
-            hit.as_ref().is_some_and(|hit| {
-                let normal = hit.blend(|v| source_normals[source_seams.unique_of[v] as usize]);
-                hit.distance as f32 <= REACH * size && cosine(normal, normals[v]) >= MIN_COSINE
+        // Cosine of the angle between the normals of a position and its closest point, if that is near; otherwise 0.
+        let near_cosine = |(v, hit): (usize, &Option<Hit>)| {
+            hit.as_ref().filter(|hit| hit.distance as f32 <= REACH * size).map_or(0.0, |hit| {
+                cosine(hit.blend(|v| source_normals[source_seams.unique_of[v] as usize]), normals[v])
             })
         };
-        let mut known: Vec<bool> = hits.iter().enumerate().map(is_match).collect();
+        let mut cosines: Vec<f32> = hits.iter().enumerate().map(near_cosine).collect();
+        let n_of_sign = |sign: f32| cosines.iter().filter(|&&c| sign * c >= MIN_COSINE).count();
+        let is_turned = n_of_sign(-1.0) > MIN_OPPOSITE_RATIO * n_of_sign(1.0);
+        if is_turned {
+            cosines.iter_mut().for_each(|cosine| *cosine = -*cosine);
+            normals.iter_mut().for_each(|normal| *normal = -*normal);
+        }
+        let mut known: Vec<bool> = cosines.iter().map(|&cosine| cosine >= MIN_COSINE).collect();
 
         let mut matched = cloth.clone();
         matched.triangles.retain(|corners| corners.iter().all(|&v| known[v as usize]));
@@ -106,7 +118,13 @@ impl Inpainting {
             inpainted: count(&is_free, true),
             copied: count(&reached, false),
         };
-        Self { seams, cloth, hits, outer, is_free, graph, origins }
+        Self { seams, cloth, hits, outer, is_free, graph, origins, is_turned }
+    }
+
+    /// Whether the normals of the target were negated, because most of them are opposite to those of the source near them.
+    #[must_use]
+    pub fn is_turned(&self) -> bool {
+        self.is_turned
     }
 
     /// Distinct positions of the target's vertices.

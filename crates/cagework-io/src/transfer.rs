@@ -30,8 +30,8 @@ pub enum TransferError {
     HasSkin(String),
     /// No vertex is near the body.
     #[error(
-        "no vertex of {} is near the body and faces the same way (distance at most {REACH} of the body's diagonal, angle at \
-         most 30 degrees): give both files the same units, axes and pose, and faces that point outwards",
+        "no vertex of {} is near the body and parallel to it (distance at most {REACH} of the body's diagonal, angle at \
+         most 30 degrees): give both files the same units, axes and pose",
         shown(.0)
     )]
     Far(String),
@@ -52,6 +52,9 @@ pub struct TransferReport {
     /// Positions by the origin of their weights and displacements.
     #[serde(flatten)]
     pub origins: Origins,
+    /// Whether the faces of clothes and body point in opposite directions, so that the normals of the clothes were negated
+    /// to match them.
+    pub opposite_faces: bool,
     /// Number of joints that were added; 0 if the clothes have a skin, or the body has none.
     pub joints: usize,
     /// Targets of the body that move nothing on the clothes. They are left out.
@@ -166,6 +169,7 @@ impl Model {
         let mut report = TransferReport { push_out: options.push_out, ..TransferReport::default() };
         report.joints = if takes_skin { joints.len() } else { 0 };
         report.origins = inpainting.origins();
+        report.opposite_faces = inpainting.is_turned();
         let weights = takes_skin.then(|| inpainting.weights(&weights_of(&player, &joints), joints.len()));
 
         let mut rest = inpainting.positions().to_vec();
@@ -365,6 +369,12 @@ pub fn transfer_report(report: &TransferReport) -> Vec<String> {
     add(matched, format!("{} like the closest point of the body", positions(matched)));
     add(inpainted, format!("{} that continue their neighbours", positions(inpainted)));
     add(copied, format!("{} in parts away from the body, like its closest point", positions(copied)));
+    add(
+        usize::from(report.opposite_faces),
+        "faces of clothes and body point in opposite directions, so normals of the clothes were negated to match them: \
+         check which of the two point inwards"
+            .to_owned(),
+    );
     add(report.joints, format!("{} of the body", counted(report.joints, "joint", "joints")));
     add(report.targets.len(), format!("{} of the body", targets(report.targets.len())));
     add(still_targets, format!("{} left out, which move nothing", targets(still_targets)));

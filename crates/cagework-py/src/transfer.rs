@@ -18,7 +18,8 @@ use crate::{error, work};
 ///
 /// Returns the bytes of a GLB, identical to the file that `cagework transfer` writes, and a dict. It has the numbers of positions by
 /// the origin of their values, matched (closest point of the body), inpainted (continue their neighbours) and copied (parts away
-/// from the body); joints, still_targets and existing_targets (numbers); rest and targets, with the count and depth (object units)
+/// from the body); opposite_faces (whether faces of clothes and body point in opposite directions, so that normals of the clothes
+/// were negated); joints, still_targets and existing_targets (numbers); rest and targets, with the count and depth (object units)
 /// of positions inside the body, and of those left after pushing out. The method is weight inpainting, see docs/rigs.md.
 ///
 /// Raises OSError, ModelError, OptionError.

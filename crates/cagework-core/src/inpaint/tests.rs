@@ -61,6 +61,28 @@ fn a_cloth_beside_an_arm_stays_with_its_body() {
 }
 
 #[test]
+fn a_cloth_whose_faces_point_inwards_is_matched_with_its_back() {
+    // Seen from its back, the cloth faces the arm of the test above. The same cloth turned around has the same values.
+    let torso = sheet(8, |u, v| Vec3::new(0.0, u, v));
+    let arm = sheet(8, |u, v| Vec3::new(0.1, v, u));
+    let body = joined(&[torso, arm]);
+    let values: Vec<f32> =
+        body.positions.iter().flat_map(|p| if p.x > 0.0 { [0.0, 1.0] } else { [1.0, 0.0] }).collect();
+    let bulge = |u: f32, v: f32| 0.01 + 0.075 * (4.0 * u * (1.0 - u) * 4.0 * v * (1.0 - v)).powi(2);
+    let cloth = sheet(20, |u, v| Vec3::new(bulge(u, v), u, v));
+    let turned = TriMesh {
+        positions: cloth.positions.clone(),
+        triangles: cloth.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(),
+    };
+    let [cloth, turned] = [cloth, turned].map(|cloth| Inpainting::new(&body, &cloth));
+    assert_eq!([cloth.is_turned(), turned.is_turned()], [false, true]);
+    assert_eq!(turned.origins(), cloth.origins());
+    for row in turned.weights(&values, 2).chunks(2) {
+        assert!((row[0] - 1.0).abs() < 1e-3 && row[1] < 1e-3, "{row:?}");
+    }
+}
+
+#[test]
 fn both_sides_of_a_thick_cloth_get_the_same_values() {
     let body = sheet(8, |u, v| Vec3::new(u, v, 0.0));
     let values: Vec<f32> = body.positions.iter().flat_map(|p| [p.x, 1.0 - p.x]).collect();
@@ -71,6 +93,8 @@ fn both_sides_of_a_thick_cloth_get_the_same_values() {
     let cloth = joined(&[outer, inner, button]);
     let inpainting = Inpainting::new(&body, &cloth);
     assert_eq!(inpainting.origins(), Origins { matched: 200, inpainted: 0, copied: 9 });
+    // As many positions face away from the body as towards it.
+    assert!(!inpainting.is_turned());
     for (p, row) in cloth.positions.iter().zip(inpainting.weights(&values, 2).chunks(2)) {
         assert!((row[0] - p.x).abs() < 1e-5, "{p}: {row:?}");
     }
