@@ -11,7 +11,7 @@
 //! - rig points of a rigged model: `extra_points` (float32, `[n, 3]`), whose weights are the last n rows;
 //! - controls inside the cage: `inner_controls` (float32, `[n, 3]`), whose weights are the last n columns.
 //!
-//! The reader also accepts SciPy's variants: deflated, 64-bit indices, 64-bit floats.
+//! The reader also accepts SciPy's variants: deflated, 64-bit indices, 64-bit floats, `format` as a Unicode string.
 
 mod arrays;
 
@@ -226,8 +226,9 @@ pub(crate) fn write_npy_points(points: &[DVec3], is_wide: bool) -> Vec<u8> {
 pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights, NpzError> {
     let mut zip = Archive::new(bytes, memory_limit)?;
     let format = required(&mut zip, "format")?;
-    if format.data != b"csr" {
-        let found = shown(&String::from_utf8_lossy(&format.data));
+    let name = format.text()?;
+    if name != "csr" {
+        let found = shown(&name);
         return Err(
             format.fault(&format!("is '{found}', but only csr is read: convert it with matrix.tocsr()"))
         );

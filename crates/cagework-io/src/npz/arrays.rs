@@ -155,6 +155,13 @@ const PREAMBLE_BYTES: u64 = 12;
 /// Offset of the header's text in files of version 1. Later versions have two more bytes for its length.
 const HEADER_TEXT_OFFSET: usize = 10;
 
+/// Size of a character in NumPy's Unicode strings, bytes.
+const UNICODE_BYTES: u64 = 4;
+
+fn is_unicode(dtype: &str) -> bool {
+    dtype.as_bytes().get(1) == Some(&b'U')
+}
+
 /// Finds the offset of the end of an `.npy` file's header, versions 1 to 3.
 fn header_end(bytes: &[u8]) -> Option<u64> {
     let rest = bytes.strip_prefix(NPY_MAGIC)?;
@@ -204,7 +211,8 @@ impl NpyArray {
         }
         let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
         // The element size. A type without a size is rejected when its values are converted.
-        let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
+        let size = dtype.get(2..).and_then(|size| size.parse().ok()).unwrap_or(8_u64);
+        let width = if is_unicode(&dtype) { size.saturating_mul(UNICODE_BYTES) } else { size };
         let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
         let needed = needed.ok_or_else(|| {
             fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}"))))
@@ -274,6 +282,19 @@ impl NpyArray {
                     .fault(&format!("has type {}; it must be int32 or int64, little-endian", shown(other))))
             }
         }
+    }
+
+    /// Reads a single string: bytes (`|S3`) or Unicode (`<U3`). NumPy pads both with zeros.
+    pub(super) fn text(&self) -> Result<String, NpzError> {
+        let text = match self.dtype.as_bytes() {
+            [b'|', b'S', ..] => String::from_utf8_lossy(&self.data).into_owned(),
+            [b'<', b'U', ..] => {
+                let characters = self.data.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes));
+                characters.map(|c| char::from_u32(c).unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+            }
+            _ => return Err(self.fault(&format!("has type {}; it must be a string", shown(&self.dtype)))),
+        };
+        Ok(text.trim_end_matches('\0').to_owned())
     }
 
     pub(super) fn floats(&self) -> Result<Vec<f32>, NpzError> {

@@ -227,6 +227,23 @@ fn deflated_files_with_wide_numbers_are_read() {
     assert_eq!(read_weights_npz(&wide, LIMIT).unwrap(), saved(sample()));
 }
 
+/// `numpy.savez(format="csr")` writes the name as `<U3`: three characters of 4 bytes, as numpy.lib.format documents.
+#[test]
+fn the_name_of_the_layout_may_be_unicode() {
+    let written = |name: &'static str, dtype: &'static str| {
+        rewritten(move |n, d| {
+            let header = String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("|S3", dtype);
+            let name: Vec<u8> = name.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+            Some(if n == "format.npy" { [&d[..10], header.as_bytes(), &name].concat() } else { d })
+        })
+    };
+    assert_eq!(read_weights_npz(&written("csr", "<U3"), LIMIT).unwrap(), saved(sample()));
+    assert_eq!(read_weights_npz(&written("csr\0", "<U4"), LIMIT).unwrap(), saved(sample()));
+    let message = |bytes: &[u8]| read_weights_npz(bytes, LIMIT).unwrap_err().to_string();
+    assert!(message(&written("csc", "<U3")).contains("is 'csc', but only csr is read"));
+    assert!(message(&written("cs", "<f8")).contains("has type <f8; it must be a string"));
+}
+
 #[test]
 fn errors_name_the_array_at_fault() {
     let message = |bytes: &[u8]| read_weights_npz(bytes, LIMIT).unwrap_err().to_string();
