@@ -61,14 +61,15 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         "rest error",
         format!("mean {:.1e}, max {:.1e} of the cage's diagonal", error.mean_rel, error.max_rel),
     );
-    let raw = report.raw_error;
-    row(
-        "solver error",
-        format!(
-            "mean {:.1e}, max {:.1e} of the diagonal, |sum - 1| at most {:.1e}, before the rows were restored",
-            raw.point_rel.mean, raw.point_rel.max, raw.sum.max
-        ),
-    );
+    if let Some(raw) = report.raw_error {
+        row(
+            "solver error",
+            format!(
+                "mean {:.1e}, max {:.1e} of the diagonal, |sum - 1| at most {:.1e}, before the rows were restored",
+                raw.point_rel.mean, raw.point_rel.max, raw.sum.max
+            ),
+        );
+    }
     let weights = report.weights;
     row(
         "weights",

@@ -186,7 +186,7 @@ mod tests {
         let options = BindOptions { grid: 16, tau: 1e-7, ..BindOptions::default() };
         let binding = bind(&points, controls, &options, &NoProgress).unwrap();
         assert_eq!(binding.weights.n_columns(), 8);
-        assert!(binding.report.raw_error.point_rel.max < f64::from(ROUNDING));
+        assert!(binding.report.raw_error.unwrap().point_rel.max < f64::from(ROUNDING));
         for (v, p) in points.iter().enumerate() {
             let (columns, weights) = binding.weights.row(v);
             for (c, expected) in trilinear(*p).into_iter().enumerate() {

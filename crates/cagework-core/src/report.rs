@@ -60,9 +60,9 @@ pub struct BindReport {
     /// Rest error: distance of `sum_i w_i c_i`, over all columns, from the mesh vertex.
     pub rest_error: RestError,
     /// Error of the rows of weights before they are corrected. With the embedded method, it is the error of the solver
-    /// alone.
+    /// alone. `None` if all rows have offsets, as around inner points and bones: their weights do not reproduce positions.
     #[serde(default)]
-    pub raw_error: RawError,
+    pub raw_error: Option<RawError>,
     /// Range, largest sum error, and number of the stored weights.
     pub weights: WeightStats,
     /// Number of mesh vertices (rows).

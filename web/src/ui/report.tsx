@@ -41,7 +41,7 @@ export function ReportCard({ report }: { report: BindReport }) {
           [T.report.computedOn, report.backend === "gpu" ? T.report.gpu(report.adapter) : T.report.cpu],
           [T.report.restMean, scientific(report.rest_error.mean_rel)],
           [T.report.restLargest, scientific(report.rest_error.max_rel)],
-          ...rawFacts(T.report.solverError, report.raw_error.point_rel),
+          ...rawFacts(T.report.solverError, report.raw_error?.point_rel),
           [T.report.weights, T.report.range(scientific(report.weights.min), scientific(report.weights.max))],
         ]}
       />
@@ -58,7 +58,7 @@ export function ReportCard({ report }: { report: BindReport }) {
             [T.report.sample, duration(report.timings_ms.sample)],
             [T.report.estimated, bytes(report.memory_bytes.estimated)],
             [T.report.peak, bytes(report.memory_bytes.peak)],
-            ...rawFacts(T.report.sums, report.raw_error.sum),
+            ...rawFacts(T.report.sums, report.raw_error?.sum),
             [T.report.row, scientific(report.weights.max_sum_error)],
             [T.report.stored, `${count(report.weights.nonzeros)} (${percent(density(report))})`],
             [T.report.smooth, report.smooth > 0 && count(report.smooth)],
@@ -76,12 +76,14 @@ export function ReportCard({ report }: { report: BindReport }) {
   );
 }
 
-/** Rows with the mean and the largest value of the error called `name`. */
-function rawFacts(name: string, error: MeanMax): [string, string][] {
-  return [
-    [T.report.mean(name), scientific(error.mean)],
-    [T.report.largest(name), scientific(error.max)],
-  ];
+/** Rows with the mean and the largest value of the error called `name`; none if it was not measured. */
+function rawFacts(name: string, error: MeanMax | undefined): [string, string][] {
+  return error === undefined
+    ? []
+    : [
+        [T.report.mean(name), scientific(error.mean)],
+        [T.report.largest(name), scientific(error.max)],
+      ];
 }
 
 export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): string {

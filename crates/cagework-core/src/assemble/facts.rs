@@ -58,10 +58,10 @@ impl RowFacts {
 }
 
 impl AssembledWeights {
-    /// Computes the rest error after correction, the error before correction of the rows without offsets, and
-    /// statistics of the weights. `diagonal`: diagonal of the cage, object units.
+    /// Computes the rest error after correction, the error before correction of the rows without offsets (`None` if all
+    /// rows have offsets), and statistics of the weights. `diagonal`: diagonal of the cage, object units.
     #[must_use]
-    pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {
+    pub fn statistics(&self, diagonal: f64) -> (RestError, Option<RawError>, WeightStats) {
         let mut errors: Vec<f32> = self.facts.iter().filter_map(|facts| facts.error).collect();
         let mut rest_error = RestError::default();
         if !errors.is_empty() {
@@ -83,16 +83,16 @@ impl AssembledWeights {
             weights.max_sum_error = f64::from(over(|f| f.sum_error, f32::max));
         }
         let raw = || self.facts.iter().filter_map(|facts| facts.raw);
-        let n = raw().count().max(1) as f64;
+        let n = raw().count() as f64;
         let mean_max = |of: fn(RawRow) -> f64| MeanMax {
             mean: raw().map(of).sum::<f64>() / n,
             max: raw().map(of).fold(0.0, f64::max),
         };
-        let raw_error = RawError {
+        let raw_error = raw().map(|r| r.lowest).reduce(f32::min).map(|min_weight| RawError {
             sum: mean_max(|r| (r.sums.sum - 1.0).abs()),
             point_rel: mean_max(|r| r.sums.miss),
-            min_weight: raw().map(|r| r.lowest).reduce(f32::min).unwrap_or_default(),
-        };
+            min_weight,
+        });
         (rest_error, raw_error, weights)
     }
 }

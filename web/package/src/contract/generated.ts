@@ -160,9 +160,9 @@ memory_bytes: MemoryBytes,
 rest_error: RestError,
 /**
  * Error of the rows of weights before they are corrected. With the embedded method, it is the error of the solver
- * alone.
+ * alone. `None` if all rows have offsets, as around inner points and bones: their weights do not reproduce positions.
  */
-raw_error: RawError,
+raw_error: RawError | null,
 /**
  * Range, largest sum error, and number of the stored weights.
  */
