@@ -10,7 +10,7 @@ use ply_rs_bw::writer::Writer;
 
 use crate::ply_text::{fault_of, readable, stray_line};
 use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, color_bytes};
-use crate::shown::{MAX_NAME_CHARS, shown_start};
+use crate::shown::{MAX_NAME_CHARS, shown_start, without_byte_order_mark};
 
 // Names of the vertex properties that are read.
 const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -168,7 +168,7 @@ fn unstrip(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
 
 /// Whether the first line is `ply`.
 pub(crate) fn is_ply(bytes: &[u8]) -> bool {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = without_byte_order_mark(bytes);
     bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
 }
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use crate::obj::{lines, shown_token};
 use crate::polygons::{PolygonsError, fault};
-use crate::shown::{MAX_NAME_CHARS, shown_start};
+use crate::shown::{MAX_NAME_CHARS, shown_start, without_byte_order_mark};
 
 /// Replacement for non-finite numbers of text files. The parser reads it as infinity.
 const INFINITY_TEXT: &[u8] = b"1e999";
@@ -76,7 +76,7 @@ pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
 
 /// Rewrites the file in the form that the parser accepts. Borrows if nothing has to change.
 pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = without_byte_order_mark(bytes);
     // The first line shows which line end the file uses.
     let is_old = bytes
         .iter()

@@ -8,6 +8,15 @@ const MAX_CONTEXT_BYTES: usize = 40;
 /// Limit on a text in a message, characters.
 const MAX_CHARS: usize = 200;
 
+/// Mark at the beginning of UTF-8 files that some editors write.
+pub(crate) const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// Text of a file without the byte order mark.
+#[must_use]
+pub fn without_byte_order_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// Formats text of a file for a message: escaped, with the middle of long texts removed. At most 200 characters before
 /// escaping.
 #[must_use]

@@ -12,6 +12,7 @@ use crate::error::WriteError;
 use crate::obj::{Group, lines, rest_of, shown_token, tokens};
 use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, fault, numbers};
+use crate::shown::without_byte_order_mark;
 
 /// Sizes in a binary file, bytes: header with triangle count, and one triangle.
 const HEADER_BYTES: usize = 84;
@@ -35,7 +36,7 @@ fn is_binary(bytes: &[u8]) -> bool {
 }
 
 fn is_text(bytes: &[u8]) -> bool {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = without_byte_order_mark(bytes);
     let start = &bytes[..bytes.len().min(4096)];
     bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
         // The header of a binary file can contain `solid` and `facet`, but the file also contains zero bytes.

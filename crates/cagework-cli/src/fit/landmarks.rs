@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cagework_core::Weights;
 use cagework_core::geometry::closest_point_on_triangle;
-use cagework_io::json_fault;
+use cagework_io::{json_fault, without_byte_order_mark};
 use cagework_pose::pull::is_barycentric;
 use glam::DVec3;
 use serde::Deserialize;
@@ -47,8 +47,9 @@ type SurfacePoint = ([u32; 3], [f64; 3]);
 /// If the file cannot be read, its JSON is invalid, or an index or number is out of range.
 pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliError> {
     let bytes = read(path)?;
+    let text = without_byte_order_mark(&bytes);
     let all: Vec<LandmarkJson> =
-        serde_json::from_slice(&bytes).map_err(|e| CliError::file(path, json_fault(&bytes, &e)))?;
+        serde_json::from_slice(text).map_err(|e| CliError::file(path, json_fault(text, &e)))?;
     if !(1..=MAX_LANDMARKS).contains(&all.len()) {
         return Err(wrong(path, &format!("has {} landmarks; expected 1 to {MAX_LANDMARKS}", all.len())));
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_io::{json_fault, shown};
+use cagework_io::{json_fault, shown, without_byte_order_mark};
 use cagework_pose::pull::{DRAG_FRAMES, Handle, Reach};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
@@ -93,8 +93,9 @@ impl Job {
                 MAX_JOB_BYTES >> 10
             )));
         }
-        let file: JobJson = serde_json::from_slice(&bytes)
-            .map_err(|e| wrong(format!("not a job: {}", json_fault(&bytes, &e))))?;
+        let text = without_byte_order_mark(&bytes);
+        let file: JobJson = serde_json::from_slice(text)
+            .map_err(|e| wrong(format!("not a job: {}", json_fault(text, &e))))?;
         let handle = |list: &str, k: usize, handle: &HandleJson| match handle {
             HandleJson { vertex: Some(v), triangle: None, bary: None, cage: None, .. } => {
                 Ok(Handle::Vertex(*v))

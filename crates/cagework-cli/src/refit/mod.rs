@@ -14,7 +14,9 @@ use cagework_core::deform::displacements;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Cancellation;
 use cagework_core::{Binding, Controls};
-use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown};
+use cagework_io::{
+    Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown, without_byte_order_mark,
+};
 use glam::{DVec3, Vec3};
 
 use crate::args::{ModelOutput, RefitArgs, SizeArgs};
@@ -175,8 +177,9 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
 fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
     let mut models = args.models.clone();
     if let Some(path) = &args.manifest {
-        let text = String::from_utf8(read(path)?).map_err(|e| CliError::file(path, e))?;
-        let lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines().map(str::trim);
+        let bytes = read(path)?;
+        let text = str::from_utf8(without_byte_order_mark(&bytes)).map_err(|e| CliError::file(path, e))?;
+        let lines = text.lines().map(str::trim);
         models.extend(lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(PathBuf::from));
         if models.is_empty() {
             return Err(CliError::file(path, "names no model"));

@@ -53,6 +53,12 @@ fn landmarks_recover_the_pose_and_a_single_one_translates_the_model() {
     let done = sandbox.json(&format!("{FIT} --landmarks all.json --json"));
     assert!(max_distance(&sandbox, "pose.obj", "bent.obj") <= 1e-3, "{done}");
 
+    // Editors on Windows write a byte order mark.
+    let [all, pose] = ["all.json", "pose.obj"].map(|name| sandbox.read(name));
+    sandbox.write("all.json", [b"\xef\xbb\xbf".as_slice(), &all].concat());
+    sandbox.run(&format!("{FIT} --landmarks all.json")).success();
+    assert!(sandbox.read("pose.obj") == pose);
+
     // A single landmark leads to a translation.
     sandbox.write("one.json", format!("[{{\"vertex\": 7, \"to\": {}}}]", json(rest[7].map(|x| x + 0.5))));
     sandbox

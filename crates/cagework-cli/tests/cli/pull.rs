@@ -46,6 +46,11 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
     }
     assert!(done["reach"].is_null() && done["far_mean"].is_null(), "the whole model follows");
     assert!(done["error"].as_f64().unwrap() < 1e-3);
+    // Editors on Windows write a byte order mark.
+    let (job, pose) = (sandbox.read("job.json"), sandbox.read("pose.obj"));
+    sandbox.write("job.json", [b"\xef\xbb\xbf".as_slice(), &job].concat());
+    sandbox.run(PULL).success();
+    assert!(sandbox.read("pose.obj") == pose);
     sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose pose.obj -o out.obj").success();
     let posed = obj_positions(&sandbox.read("out.obj"));
     assert!((posed[top][1] - y - 0.4).abs() < 2e-3, "{:?}", posed[top]);

@@ -19,7 +19,7 @@ use super::root::DRACO;
 use super::root::{MESHOPT, typed, view_bytes};
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
-use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
+use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start, without_byte_order_mark};
 use crate::siblings::{IMAGE_FAULT, Image, Resolve, SiblingError, Siblings};
 
 /// Limit on the items of each of [`Lists`]. An item takes up to 1 KB while a file is written.
@@ -147,7 +147,7 @@ fn decoded_bytes(text: &[u8]) -> u64 {
 /// Splits a GLB into JSON and binary chunk. Without GLB magic, the file is JSON.
 fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).into(), None));
+        return Ok((without_byte_order_mark(bytes).into(), None));
     }
     let fault = |problem: String| GltfError::Container(problem);
     let word = |at: usize| {

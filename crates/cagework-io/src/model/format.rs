@@ -9,7 +9,7 @@ use crate::error::WriteError;
 #[cfg(feature = "compress")]
 use crate::gltf::CompactOptions;
 use crate::polygons::Shape;
-use crate::shown::shown;
+use crate::shown::{shown, without_byte_order_mark};
 use crate::siblings::Resolve;
 use crate::splats::{records, spz};
 use crate::up::UpAxis;
@@ -327,7 +327,7 @@ impl ModelFormat {
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint: &str| Err(FormatError { name: name.into(), found, hint: hint.into() });
         let export = format!("export it as {}", Self::listed(ModelProperty::Faces));
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let text = without_byte_order_mark(bytes).trim_ascii_start();
         let ending = extension(name);
         if ["sog", "ksplat", "lcc"].contains(&ending.as_str()) {
             let hint = format!("convert it with `splat-transform IN.{ending} OUT.ply`");
