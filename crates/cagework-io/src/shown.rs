@@ -50,11 +50,15 @@ pub fn value_fault(error: &str) -> String {
     let mut words = error.split(['`', '"']).skip(1).step_by(2).map(shown);
     let error = error.strip_prefix("Error: ").unwrap_or(error);
     match words.next() {
+        Some(word) if error.starts_with("duplicate") => format!("'{word}' is given twice"),
         Some(word) if error.starts_with("unknown") => {
             format!("'{word}' is not known; it must be one of {}", words.collect::<Vec<_>>().join(", "))
         }
         Some(word) if error.starts_with("missing") => format!("'{word}' is missing"),
         Some(word) => format!("'{word}' has the wrong type"),
+        None if error.starts_with("invalid type: map, expected a sequence") => {
+            "an object is given, but a list is expected".to_owned()
+        }
         None => "a value has the wrong type".to_owned(),
     }
 }
@@ -70,6 +74,10 @@ pub fn json_fault(text: &[u8], error: &serde_json::Error) -> String {
         _ => "the JSON is damaged".to_owned(),
     };
     let (line, column) = (error.line(), error.column());
+    // Serde gives the end of the previous token, so a fault of the first token is at column 0.
+    if column == 0 {
+        return format!("{what}, at the start of line {line}");
+    }
     let of_line = text.split(|&byte| byte == b'\n').nth(line.saturating_sub(1)).unwrap_or_default();
     let before = String::from_utf8_lossy(
         &of_line[column.saturating_sub(MAX_CONTEXT_BYTES).min(of_line.len())..column.min(of_line.len())],
@@ -108,6 +116,11 @@ mod tests {
             message(&"[".repeat(1000)),
             format!("the JSON is nested too deeply, at line 1, column 128, after '{}'", "[".repeat(40))
         );
+        let error = from_slice::<Vec<u32>>(b"{}").unwrap_err();
+        assert_eq!(
+            json_fault(b"{}", &error),
+            "an object is given, but a list is expected, at the start of line 1"
+        );
         let kinds = [
             (
                 "unknown variant `run`, expected `follow` or `stay`",
@@ -115,7 +128,9 @@ mod tests {
             ),
             ("Error: missing field `to`", "'to' is missing"),
             ("invalid type: floating point `64.5`, expected u32", "'64.5' has the wrong type"),
-            ("invalid type: map, expected a sequence", "a value has the wrong type"),
+            ("invalid type: map, expected a sequence", "an object is given, but a list is expected"),
+            ("invalid length 0, expected an array of length 3", "a value has the wrong type"),
+            ("duplicate field `vertex`", "'vertex' is given twice"),
         ];
         for (error, ours) in kinds {
             assert_eq!(value_fault(error), ours);

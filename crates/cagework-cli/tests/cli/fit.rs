@@ -109,7 +109,7 @@ fn invalid_targets_are_rejected_and_nothing_is_written() {
         .stderr(contains("lambda is -1; it must be a number of at least 0"));
     for (landmarks, message) in [
         ("[]", "bad.json: has 0 landmarks; expected 1 to 10000"),
-        ("{}", "bad.json: a value has the wrong type, at line 1, column 0"),
+        ("{}", "bad.json: an object is given, but a list is expected, at the start of line 1"),
         ("[{\"vertex\": 178, \"to\": [0, 0, 0]}]", "landmark 0 names vertex 178; indices run from 0 to 177"),
         ("[{\"to\": [0, 0, 0]}]", "landmark 0 needs one of vertex, triangle (with bary) and point"),
         (
