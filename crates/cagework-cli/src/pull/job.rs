@@ -135,6 +135,11 @@ impl Job {
             }
             to.push(DVec3::from_array(target));
         }
+        if let Some(k) = file.pins.iter().position(|pin| pin.to.is_some()) {
+            return Err(wrong(format!(
+                "pin {k} has a target \"to\", but pins stay in place: leave \"to\" out, or list it among the grabs"
+            )));
+        }
         let pins =
             file.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;
         // A relative path refers to the job's folder if the file exists there, otherwise to the working directory.

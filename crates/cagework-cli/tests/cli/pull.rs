@@ -112,6 +112,11 @@ fn invalid_jobs_are_rejected_and_write_nothing() {
         (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "a number is out of range, at line 1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": -1}"#, "the reach is -1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": "far"}"#, "the reach is 'far'"),
+        (
+            r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "pins": [{"vertex": 1}, {"vertex": 2, "to": [0, 0, 1]}]}"#,
+            "pin 1 has a target \"to\", but pins stay in place",
+        ),
+        (r#"{"grabs": [{"vertex": 0, "vertex": 1, "to": [0, 0, 0]}]}"#, "not a job: 'vertex' is given twice"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "relax": 3}"#, "relax is 3"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "frames": 0}"#, "frames is 0"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "start": "none.obj"}"#, "none.obj"),
