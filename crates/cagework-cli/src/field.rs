@@ -4,6 +4,7 @@ use std::path::Path;
 
 use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
 use cagework_core::team::Team;
+use cagework_core::words::{counted, grouped};
 use cagework_core::{BindOptions, Cage};
 use cagework_io::{Model, PointFile, UpAxis, shown, write_field_blender, write_field_npz};
 use glam::{DVec3, Vec3};
@@ -29,6 +30,8 @@ struct MapSummary {
     points: usize,
     /// Indices of the points without an inverse, from 0. These points are unchanged.
     not_found: Vec<usize>,
+    /// Number of points beyond the lattice around the cage. These points are unchanged.
+    beyond_lattice: usize,
     lattice: [u32; 3],
     notices: Vec<String>,
 }
@@ -95,11 +98,22 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
             first + 1
         ));
     }
+    if let [first, ..] = mapped.beyond_lattice[..] {
+        let n = mapped.beyond_lattice.len();
+        let [are, stay] = if n == 1 { ["is", "stays where it is"] } else { ["are", "stay where they are"] };
+        notices.push(format!(
+            "{} of {} {are} beyond the lattice around the cage and {stay}. The first is point {}.",
+            grouped(n),
+            counted(mapped.points.len(), "point", "points"),
+            first + 1
+        ));
+    }
     write(&args.output, &bytes)?;
     let summary = MapSummary {
         output: args.output.display().to_string(),
         points: mapped.points.len(),
         not_found: mapped.not_found,
+        beyond_lattice: mapped.beyond_lattice.len(),
         lattice: lattice.dims.to_array(),
         notices,
     };
@@ -193,10 +207,12 @@ fn field_of(
     Ok(FieldWeights::bind(cage.controls(), cells, &options, &bar)?.pose(rest, &poses[0]))
 }
 
-/// Mapped points, and the indices of those without an inverse.
+/// Mapped points, and the indices of those without an inverse and of those beyond the reach of the cage.
 struct MappedPoints {
     points: Vec<Vec3>,
     not_found: Vec<usize>,
+    /// Indices of the points beyond the lattice, at rest.
+    beyond_lattice: Vec<usize>,
 }
 
 fn map(field: &Field, points: &[Vec3], backwards: bool) -> MappedPoints {
@@ -208,9 +224,13 @@ fn map(field: &Field, points: &[Vec3], backwards: bool) -> MappedPoints {
     };
     let found = Team::new(0).share(runs.len(), || (), of_run).concat();
     let not_found = (0..points.len()).filter(|&k| found[k].is_none()).collect();
+    let at_rest = |k: usize| if backwards { found[k] } else { Some(points[k]) };
+    let is_beyond = |&k: &usize| at_rest(k).is_some_and(|p| !field.lattice.contains(p));
+    let beyond_lattice = (0..points.len()).filter(is_beyond).collect();
     MappedPoints {
         points: found.iter().zip(points).map(|(found, p)| found.unwrap_or(*p)).collect(),
         not_found,
+        beyond_lattice,
     }
 }
 

@@ -131,6 +131,12 @@ impl Lattice {
         is_inside.then(|| self.place(point))
     }
 
+    /// Whether a point is inside the lattice. Beyond it the displacement is zero.
+    #[must_use]
+    pub fn contains(&self, point: Vec3) -> bool {
+        self.cell_of(point).is_some()
+    }
+
     /// Finds the nodes inside the cage or near it, ascending. A flood fill from the first node spreads over nodes that
     /// are farther than `BOUND_CELLS` cells from the cage; the nodes that it does not visit are returned.
     fn around(&self, cage: &Cage) -> Vec<u32> {

@@ -46,6 +46,24 @@ fn points_are_mapped_there_and_back() {
 }
 
 #[test]
+fn points_beyond_the_lattice_are_counted() {
+    let sandbox = posed();
+    let map = "map probes.csv --cage cage.obj --pose posed.obj";
+    let notice =
+        "1 of 3 points is beyond the lattice around the cage and stays where it is. The first is point 3.";
+    // At rest only `far` is beyond the lattice; from there, no inverse starts or ends inside.
+    for inverse in ["", " --inverse"] {
+        let done = sandbox.json(&format!("{map}{inverse} -o out.csv --json"));
+        assert_eq!((&done["beyond_lattice"], &done["notices"]), (&1.into(), &serde_json::json!([notice])));
+        assert_eq!(rows(&sandbox.read("out.csv"))[2], [40.0, 0.0, 0.0]);
+    }
+    sandbox.run(&format!("{map} -o out.csv")).success().stdout(contains(format!("note: {notice}")));
+    sandbox.write("near.csv", "0.1,0.2,0.3\n1.2,0,0\n");
+    let done = sandbox.json("map near.csv --cage cage.obj --pose posed.obj -o out.csv --json");
+    assert_eq!((&done["beyond_lattice"], &done["notices"]), (&0.into(), &serde_json::json!([])));
+}
+
+#[test]
 fn vertices_of_models_and_clouds_are_mapped() {
     let sandbox = posed();
     sandbox.run("map mesh.obj --cage cage.obj --pose posed.obj -o out.obj").success();
