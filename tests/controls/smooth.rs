@@ -117,7 +117,7 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
             }
         }
         let mean = sum / (points.len() * cage.n_vertices()) as f64;
-        let most = ROUND_OFF + MAX_ERROR_RATIO * by_route.report.raw_error.point_rel.max;
+        let most = ROUND_OFF + MAX_ERROR_RATIO * by_route.report.raw_error.unwrap().point_rel.max;
         assert!(mean < 1e-6 && worst < most, "mean {mean:e}, most {worst:e} of {most:e}");
     }
 }

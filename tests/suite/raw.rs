@@ -22,7 +22,7 @@ pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mea
         for &grid in grids {
             let [fine, coarse] = [1e-5, 1e-3].map(|tau| {
                 let binding = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, tau));
-                binding.report.raw_error.point_rel
+                binding.report.raw_error.unwrap().point_rel
             });
             assert!(fine.mean < mean && fine.max < MAX_POINT_ERROR, "g = {grid}: {fine:?}");
             let ratio = coarse.mean / fine.mean;
@@ -36,6 +36,7 @@ pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mea
 pub(crate) fn rounding_does_not_add_up_over_columns(back_end: &BackEnd) {
     let cage = cage(&sphere(1));
     let points = points::inside(&cage, 1000, 30);
-    let sum = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (128, 1e-5)).report.raw_error.sum;
+    let sum =
+        back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (128, 1e-5)).report.raw_error.unwrap().sum;
     assert!(sum.mean < 5e-6, "{sum:?}");
 }

@@ -56,7 +56,7 @@ impl BoundDocument<'_> {
     ) -> Result<Exported, BoundError> {
         let mut clips = Model::read_with_clips(name, file, &mut |_| None, memory_limit)?;
         if !clips.positions.is_empty() {
-            return Err(BoundError::HasMesh { name: shown(name).to_string() });
+            return Err(BoundError::HasMesh { name: shown(name) });
         }
         let Document { models, pose, .. } = self.document();
         let options = self.of_rig(pose, request)?;

@@ -511,7 +511,8 @@ fn a_vertex_of_the_cage_is_pulled_by_its_row_of_one() {
     assert!(Grip::of_seed(row.clone(), CAGE_SEED, &pull).is_err(), "no vertex of the cage");
     row[3] = 1.0;
     let grip = Grip::of_seed(row, CAGE_SEED, &pull).unwrap();
-    let mut drag = Drag::new(&pull, &start, &[grip], &[], &Frames::default(), DragOptions::default()).unwrap();
+    let mut drag =
+        Drag::new(&pull, &start, &[grip], &[], &Frames::default(), DragOptions::default()).unwrap();
     let to = start[3] + 0.1 * DVec3::Y;
     (0..20).for_each(|_| drag.frame_with_image(&[to]));
     assert!(drag.cage()[3].distance(to) < 1e-2, "{} {to}", drag.cage()[3]);

@@ -58,7 +58,8 @@ impl Engine {
             grabs.into_iter().chain(pins).filter_map(|grab| state.bound_document().grip_of(grab)).unzip()
         })?;
         let rows = Float64Array::from(rows.concat().as_slice());
-        let frames = self.read(|state| Answer::Ok(object(&*state.bound_document().require_bound()?.frames)))?;
+        let frames =
+            self.read(|state| Answer::Ok(object(&*state.bound_document().require_bound()?.frames)))?;
         Ok(Array::of3(&rows, &Uint32Array::from(seeds.as_slice()), &frames).into())
     }
 
