@@ -3,12 +3,13 @@
 //! The cage deforms the rest shape, and the skeleton is fitted to it. With `M` the skinning matrix of a
 //! vertex at rest (without a skin, the node's world transform) and `f(x) = x + by(x)` the deformation, a
 //! vertex p becomes `M'^-1 f(M p)`. Joints follow the cage. Their inverse bind matrices B change so that `G'
-//! B' = G B` for the joint's world transform G, hence `M' = M` for any bind pose of the file.
+//! B' = G B` for the joint's world transform G, hence `M' = M` for any bind pose of the file; module `binds` has an exception.
 //!
 //! [`Rig`] lists the points to bind: vertices, ends of morph targets (or a lattice around them), nodes that
 //! follow the cage, and offsets stored in VRM. An end is a vertex with one morph target at weight 0 or 1.
 //! [`reshape()`] writes the document.
 
+mod binds;
 mod clip;
 mod edit;
 mod expressions;

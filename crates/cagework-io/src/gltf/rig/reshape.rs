@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use cagework_pose::Parts;
-use glam::{DMat3, DMat4, DVec3, Mat4, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::binds::write_binds;
 use super::edit::Edit;
 use super::feet::Feet;
 use super::ground::{Ground, MIN_LIFT};
@@ -121,7 +122,7 @@ pub(crate) fn reshape(
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
         report.joints_following_parent = moved.n_follow_parent;
-        let binds = write_binds(rig, &mut edit, &moved.world);
+        let binds = write_binds(rig, &mut edit, (by, &moved.world));
         let turned = SurfaceGradients::new(triangles, by);
         for part in &rig.parts {
             if part.instance.node.is_some_and(|node| motions.contains_key(&node)) {
@@ -315,35 +316,6 @@ fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     if !copies.is_empty() {
         edit.count_uses();
     }
-}
-
-/// Writes inverse bind matrices that keep each skinning matrix, `B' = G'^-1 G B`. Returns those of all skins, rounded
-/// to f32.
-fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u32, Vec<DMat4>> {
-    let mut all = rig.binds.clone();
-    let mut numbers: Vec<u32> = all.keys().copied().collect();
-    numbers.sort_unstable();
-    for number in numbers {
-        let skin = &rig.document.root.skins[number as usize];
-        let Some(binds) = all.get_mut(&number) else { continue };
-        let mut has_changed = false;
-        for (joint, bind) in skin.joints.iter().zip(binds.iter_mut()) {
-            let [old, new] = [&rig.worlds.world[joint.value()], &world[joint.value()]];
-            let back = new.inverse();
-            if old != new && back.is_finite() {
-                *bind = (back * *old * *bind).as_mat4().as_dmat4();
-                has_changed = true;
-            }
-        }
-        if has_changed {
-            let values: Vec<[f32; 16]> =
-                binds.iter().map(|b: &DMat4| Mat4::to_cols_array(&b.as_mat4())).collect();
-            let accessor = skin.inverse_bind_matrices.map(|a| a.value());
-            let accessor = edit.write(accessor, &values, false, false);
-            edit.json["skins"][number as usize]["inverseBindMatrices"] = accessor.into();
-        }
-    }
-    all
 }
 
 fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &RigPrimitive, shape: &Shape) {

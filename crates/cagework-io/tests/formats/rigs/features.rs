@@ -289,6 +289,39 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
     }
 }
 
+/// With the middle joint bent at rest, vertices between the joints are in two poses. A clip of the shifted and uniformly
+/// scaled model must show the shifted and scaled frames of the original.
+#[test]
+fn clips_follow_a_uniform_scale_if_the_rest_pose_is_not_the_bind_pose() {
+    let mut rig = rigged();
+    let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
+    rig.json["nodes"][2]["rotation"] = json!([0.0, 0.0, sine, cosine]);
+    // The clip turns this joint, and with it only one of the two joints of the vertices below.
+    rig.json["animations"][0]["channels"][2]["target"]["node"] = json!(2);
+    let model = read(&rig.glb());
+    let extra = model.extra_points().unwrap();
+    for (scale, shift) in
+        [(1.0, vec3(0.3, 0.0, 0.1)), (1.7, vec3(0.2, 0.0, 0.0)), (0.6, vec3(-0.2, 0.4, 0.1))]
+    {
+        let scaled = |p: Vec3| scale * p + shift;
+        let by: Vec<DVec3> =
+            model.positions.iter().chain(&extra).map(|&p| scaled(p).as_dvec3() - p.as_dvec3()).collect();
+        for joints in [Joints::Follow, Joints::Turn] {
+            let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+            let bytes = model.write_reshaped(&by, &[], &[], &options).unwrap().0;
+            let [before, after] = [&model, &read(&bytes)].map(player);
+            for (clip, seconds) in
+                [(None, 0.0), (Some(0), 0.0), (Some(0), 0.3), (Some(0), 0.7), (Some(0), 1.0)]
+            {
+                let expected: Vec<Vec3> =
+                    shown(&before, clip, seconds, &[]).into_iter().map(scaled).collect();
+                let what = format!("{scale} {joints:?} {clip:?} at {seconds}");
+                assert_near(&shown(&after, clip, seconds, &[]), &expected, 4.0 * ROUNDING_TOLERANCE, &what);
+            }
+        }
+    }
+}
+
 /// Found by fuzzing: positions beyond f32 must not be written.
 #[test]
 fn skin_that_scales_beyond_f32_is_rejected() {
