@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createEdit } from "../../src/actions/edit";
 import { createPulling } from "../../src/actions/pull";
+import type { Frames } from "../../src/contract";
 import { cageOf, createFake, settled } from "../fake";
 
 /** Callbacks of requested animation frames; the test calls them. */
@@ -13,6 +14,7 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
+const FRAMES: Frames = { whole: [], joints: [], bones: [], plain: [] };
 const POINT = { triangle: 0, bary: [1, 0, 0] as [number, number, number] };
 
 /** A page ready to pull. The model is hit only by pointers with x = 10. */
@@ -21,7 +23,7 @@ function page() {
   const shown: unknown[][] = [];
   fake.teach({
     surfaceAt: (x) => (x === 10 ? POINT : undefined),
-    gripsOf: () => [Float64Array.of(0.5, 0.5), Uint32Array.of(3)],
+    gripsOf: () => [Float64Array.of(0.5, 0.5), Uint32Array.of(3), FRAMES],
     pinsAfter: (x) => (x === 10 ? [POINT] : undefined),
     placeOf: () => Float32Array.of(0, 0, 0),
     project: () => Float32Array.of(10, 10, 1),

@@ -681,7 +681,7 @@ export type GrabInput = {
  */
 start: Float32Array,
 /**
- * Weights of the grabbed points, then of the pinned points. `[n_grabs + n_pins, n_controls]`
+ * Weights of the grabbed points, then of the pinned points. `[n_grabs + n_pins, n_columns]`
  */
 rows: Float64Array,
 /**
@@ -689,6 +689,10 @@ rows: Float64Array,
  * `[n_grabs + n_pins]`
  */
 seeds: Uint32Array,
+/**
+ * Frames of the bind that the weights come from.
+ */
+frames: Frames,
 /**
  * Number of grabbed points.
  */
