@@ -60,7 +60,10 @@ pub(crate) fn memory_limit_is_kept_and_named(back_end: &BackEnd) {
     // The box of 4 x 3 x 1 has 25 million cells at g = 512, each of several bytes.
     assert!(named == limit && needed > 50 << 20, "{needed} of {named} bytes");
     let message = BindError::Memory { needed, limit }.to_string();
-    assert!(message.contains(&format!("{} MiB", needed >> 20)) && message.contains("3 MiB"), "{message}");
+    assert!(
+        message.contains(&format!("{} MiB", needed.div_ceil(1 << 20))) && message.contains("3 MiB"),
+        "{message}"
+    );
 
     let binding = back_end.bind(&points, &cage);
     let memory = binding.report.memory_bytes;

@@ -184,7 +184,7 @@ impl Playback {
     }
 
     /// Whether the playback is out of date and should be prepared again now. If the last preparation took longer than
-    /// [`SLOW_MS`], this is false until the pose is part of a history step.
+    /// 100 ms, this is false until the pose is part of a history step.
     #[must_use]
     pub fn needs_update(&self, editor: &Editor) -> bool {
         self.is_stale(editor) && (self.prepared_ms <= SLOW_MS || editor.is_pose_committed())

@@ -74,7 +74,7 @@ impl PosedModels<'_> {
         surface.is_some_and(|surface| is_covered(vertex, pose, topology, self.view, radius, surface))
     }
 
-    /// All pins except the first one within [`PIN_PX`] of the pointer.
+    /// All pins except the first one within 14 CSS pixels of the pointer.
     #[must_use]
     pub fn pins_beside(&self, at: Vec2) -> Vec<SurfacePoint> {
         let mut pins = self.editor.document().pins.to_vec();
