@@ -25,8 +25,9 @@ use tree::{Hit, TriangleTree};
 pub const REACH: f32 = 0.025;
 /// Cosine of the largest angle between their normals: 30 degrees, as in the paper.
 const MIN_COSINE: f32 = 0.866;
-/// The normals of the target are negated if this many times more positions fit the source with negated normals. The inner
-/// and outer side of a lining fit about equally often.
+/// The normals of the target are negated if this many times more positions fit the source with negated normals, and these
+/// are more than half of all. The inner and outer side of a lining fit about equally often, and the back of a small prop,
+/// such as a buckle, is less than half of it.
 const MIN_OPPOSITE_RATIO: usize = 3;
 /// Largest thickness of a cloth, as a fraction of the source's diagonal.
 const MAX_THICKNESS: f32 = 0.015;
@@ -88,7 +89,8 @@ impl Inpainting {
         };
         let mut cosines: Vec<f32> = hits.iter().enumerate().map(near_cosine).collect();
         let n_of_sign = |sign: f32| cosines.iter().filter(|&&c| sign * c >= MIN_COSINE).count();
-        let is_turned = n_of_sign(-1.0) > MIN_OPPOSITE_RATIO * n_of_sign(1.0);
+        let n_opposite = n_of_sign(-1.0);
+        let is_turned = n_opposite > MIN_OPPOSITE_RATIO * n_of_sign(1.0) && 2 * n_opposite > positions.len();
         if is_turned {
             cosines.iter_mut().for_each(|cosine| *cosine = -*cosine);
             normals.iter_mut().for_each(|normal| *normal = -*normal);
@@ -121,7 +123,8 @@ impl Inpainting {
         Self { seams, cloth, hits, outer, is_free, graph, origins, is_turned }
     }
 
-    /// Whether the normals of the target were negated, because most of them are opposite to those of the source near them.
+    /// Whether the normals of the target were negated, because most of them are opposite to those of the source near
+    /// them.
     #[must_use]
     pub fn is_turned(&self) -> bool {
         self.is_turned

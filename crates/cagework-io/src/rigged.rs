@@ -25,9 +25,9 @@ const MAX_CLIP_VERTICES: usize = 1 << 24;
 
 /// Limit on the frames of a baked clip per second.
 const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
-/// Limit on the number of frames of a baked clip. Each frame becomes a morph target, of which game engines support only
-/// a limited number.
-const MAX_BAKED_FRAMES: usize = 60;
+/// Limit on the number of frames of a baked clip: two seconds, with the frames at both ends. Each frame becomes a morph
+/// target, of which game engines support only a limited number.
+const MAX_BAKED_FRAMES: usize = 61;
 /// Limit on the positions and normals of all baked frames, bytes.
 const MAX_BAKED_BYTES: u64 = 512 << 20;
 

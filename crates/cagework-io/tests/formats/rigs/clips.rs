@@ -108,9 +108,9 @@ fn baked_clip_shows_its_frames() {
     assert_eq!(model.frames(7).unwrap_err(), WriteError::NoClip(7));
 }
 
-/// Clips of more than two seconds have 60 frames, the last at the clip's end.
+/// Clips of more than two seconds have 61 frames, the last at the clip's end.
 #[test]
-fn long_clip_is_baked_to_sixty_frames() {
+fn long_clip_is_baked_to_61_frames() {
     let mut rig = rigged();
     let (end, n) = (10.0_f32, 2);
     let times: Vec<u8> = [0.0, end].into_iter().flat_map(f32::to_le_bytes).collect();
@@ -126,8 +126,8 @@ fn long_clip_is_baked_to_sixty_frames() {
     }]);
     let model = read(&rig.glb());
     let frames = model.frames(0).unwrap();
-    assert_eq!(frames.len(), 60);
-    assert_near(&frames[59], &shown(&player(&model), Some(0), end, &[]), ROUNDING_TOLERANCE, "at the end");
+    assert_eq!(frames.len(), 61);
+    assert_near(&frames[60], &shown(&player(&model), Some(0), end, &[]), ROUNDING_TOLERANCE, "at the end");
 }
 
 /// Two channels with a missing sampler must stay unchanged. Indexing the JSON would add null members.
