@@ -12,5 +12,5 @@ export async function sample(project, id) {
   pkg.initSync({ module: readFileSync(join(folder, "dist/pkg/cagework_bg.wasm")) });
   const built = pkg.Binder.buildSample(id);
   const { positions, corners } = built.cage;
-  return { glb: built.glb, cage: { positions, corners }, posed: built.posePositions(0) };
+  return { glb: built.glb, cage: { positions, corners }, posed: built.poses[0].positions };
 }

@@ -20,6 +20,7 @@ impl Engine {
     /// # Errors
     /// If two names are equal.
     #[wasm_bindgen(js_name = zipFiles)]
+    #[allow(clippy::needless_pass_by_value, reason = "wasm-bindgen passes arrays by value")]
     pub fn zip_files(names: Vec<String>, files: Vec<Uint8Array>) -> Answer<Vec<u8>> {
         let files: Vec<(String, Vec<u8>)> =
             names.into_iter().zip(files.iter().map(Uint8Array::to_vec)).collect();
@@ -173,6 +174,7 @@ impl Engine {
     /// # Errors
     /// If no model has this clip.
     #[wasm_bindgen(js_name = modelStates, unchecked_return_type = "[Float32Array, Uint32Array]")]
+    #[allow(clippy::needless_pass_by_value, reason = "wasm-bindgen passes optional strings by value")]
     pub fn model_states(&self, clip: Option<String>) -> Answer<JsValue> {
         let states = self.read(|state| state.models().states(clip.as_deref()));
         let (positions, triangles) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
