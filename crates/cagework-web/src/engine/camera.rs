@@ -82,7 +82,7 @@ impl Engine {
 
     /// Directions of the axes x, y, z in the view: right, up, and towards the eye. `[3, 3]`
     pub fn axes(&self) -> Vec<f32> {
-        self.read(|state| state.camera.axes()).iter().flat_map(glam::Vec3::to_array).collect()
+        self.read(|state| state.camera.axes()).iter().flat_map(Vec3::to_array).collect()
     }
 
     /// Looks along an axis, 0 to 2, from its positive end, or from its negative end if `negative` is set.
