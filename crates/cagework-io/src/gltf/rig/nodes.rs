@@ -297,7 +297,14 @@ impl Rig<'_> {
             let i = node as usize;
             let [above, above_new] =
                 [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
-            if !follows(i) || (new[i] == old[i] && above == above_new) {
+            let is_still = new[i] == old[i] && above == above_new;
+            if is_still && follows(i) && moves[i].is_top && moves[i].ratio != 1.0 {
+                // A root that stays where it is, such as one on the floor outside the cage, travels with the skeleton.
+                let [at, moving] = [local(&root.nodes[i]).w_axis.truncate(), DVec3::splat(moves[i].ratio)];
+                let moving = DMat3::from_diagonal(moving);
+                moved.changes[i] = Some(NodeChange { from: at, to: at, still: moving, moving, turn: None });
+            }
+            if !follows(i) || is_still {
                 continue;
             }
             let to = above_new.inverse() * new[i];

@@ -220,3 +220,27 @@ fn constant_translations_of_top_nodes_are_positions() {
         }
     }
 }
+
+/// A root on the floor, at the fixed point of a scale, carries the travel of the clip.
+#[test]
+fn travel_of_a_root_that_stays_scales_with_the_skeleton() {
+    let mut robot = robot();
+    robot.json["animations"] = serde_json::json!([]);
+    clip(&mut robot, &[(0, "translation", vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0])]);
+    let model = read(&robot.glb());
+    let (joints, extra) = (model.joints().unwrap(), model.extra_points().unwrap());
+    let root = joints.iter().find(|joint| joint.node == 0).unwrap();
+    let outside = [(model.positions.len() + root.point) as u32];
+    let taller = |p: Vec3| vec3(p.x, 1.35 * p.y, p.z);
+    let by: Vec<DVec3> =
+        model.positions.iter().chain(&extra).map(|&p| taller(p).as_dvec3() - p.as_dvec3()).collect();
+    for outside in [&outside[..], &[]] {
+        let (bytes, _) = model.write_reshaped(&by, outside, &[], &ReshapeOptions::default()).unwrap();
+        let travel = |model: &Model| {
+            let at = |seconds: f32| player(model).at(Some(0), seconds, &[]).origins[1];
+            at(0.5) - at(0.0)
+        };
+        let (before, after) = (travel(&model), travel(&read(&bytes)));
+        assert!(before.z > 0.4 && after.distance(1.35 * before) < ROUNDING_TOLERANCE, "{before} {after}");
+    }
+}
