@@ -32,10 +32,10 @@ export function cageBroken(state: AppState): boolean {
 }
 
 /** What a problem card offers: a fix of the check, or to generate another cage. */
-export type Mend = Problem["fixes"][number] | { readonly kind: "regenerate" };
+export type ProblemFix = Problem["fixes"][number] | { readonly kind: "regenerate" };
 
 /** The best fix of a problem; undefined for a harmless one. */
-export function mendOf({ code, severity, fixes: [best] }: Problem): Mend | undefined {
+export function fixOf({ code, severity, fixes: [best] }: Problem): ProblemFix | undefined {
   const needsNewCage = severity === "error" || code === "self_intersection";
   return best ?? (needsNewCage ? { kind: "regenerate" } : undefined);
 }

@@ -2,6 +2,7 @@
 
 mod landmarks;
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use cagework_core::deform::deform_bound;
@@ -47,9 +48,9 @@ struct FitSummary {
 }
 
 /// Points of the model with their target positions.
-struct Goals {
+struct Goals<'a> {
     /// Weights of the points. `[n_points, n_columns]`
-    weights: Weights,
+    weights: Cow<'a, Weights>,
     /// Weight of each point in the sum of squared distances. `[n_points]`
     importance: Vec<f64>,
     /// Target position of each point, object units. `[n_points]`
@@ -119,7 +120,7 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
 
 /// Collects the targets of all vertices of the bound model: the vertices of `target` with the same indices. Vertices
 /// outside the cage get importance 0.
-fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, CliError> {
+fn vertices<'a>(bound: &'a BoundModel, target: Model, areas: &[f64]) -> Result<Goals<'a>, CliError> {
     let (given, expected) = (target.positions.len(), bound.model.positions.len());
     if given != expected {
         return Err(CliError::Mismatch {
@@ -144,7 +145,7 @@ fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, C
         let (vertices, them) = if n == 1 { ("vertex is", "it") } else { ("vertices are", "them") };
         notices.push(format!("{n} {vertices} outside the cage; the fit ignores {them}"));
     }
-    Ok(Goals { weights: bound.weights.clone(), importance, to: target.positions, notices })
+    Ok(Goals { weights: Cow::Borrowed(&bound.weights), importance, to: target.positions, notices })
 }
 
 /// Computes the weighted root mean square and maximum of the distances of points from their targets, both divided by

@@ -14,7 +14,7 @@ import type {
   Problem,
   Session,
 } from "../../src/contract";
-import type { Mend } from "../../src/derived";
+import type { ProblemFix } from "../../src/derived";
 import type { AppState } from "../../src/state";
 import { INITIAL_STATE, STEPS } from "../../src/state";
 import { STOPS, solvers, stopsOf } from "../../src/tour/stops";
@@ -87,13 +87,17 @@ const CAGE_WITH_CONTROLS: CageState = {
 };
 const PLACES = { vertices: [], edges: [], faces: [], points: [] };
 /** Problems with these fixes; null for one without a fix. */
-const checkOf = (mends: readonly (Mend | null)[], severity: "error" | "note", count: number): Problem[] =>
+const checkOf = (
+  mends: readonly (ProblemFix | null)[],
+  severity: "error" | "note",
+  count: number,
+): Problem[] =>
   mends.map((fix, k) => {
     const fixes = fix && fix.kind !== "regenerate" ? [fix] : [];
     return { code: "model_outside", severity, message: `${k}.`, count, places: PLACES, fixes };
   });
 const REPAIRS = ["weld", "drop_degenerate", "mirror", "fill_holes", "flip", "grow"] as const;
-const MENDS: readonly Mend[] = [
+const MENDS: readonly ProblemFix[] = [
   ...REPAIRS.map((repair) => ({ kind: "repair", repair }) as const),
   { kind: "grid", cells: 32 },
   { kind: "grid", cells: 128 },

@@ -2,7 +2,7 @@
 
 import type { CageOptions, CheckedCage, Command, NamedFile, Reading, Repair } from "../contract";
 import { HULL_TARGET } from "../defaults";
-import { cageKey, cageSettings, hasUnmadeCage, type Mend } from "../derived";
+import { cageKey, cageSettings, hasUnmadeCage, type ProblemFix } from "../derived";
 import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
 import type { CageSettings } from "../state";
@@ -185,7 +185,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
       return actions.make();
     },
     /** Runs the fix that the check offers for a problem. */
-    mend(fix: Mend) {
+    applyFix(fix: ProblemFix) {
       if (fix.kind === "repair") void actions.repair(fix.repair);
       else if (fix.kind === "regenerate") void actions.regenerate();
       else void bind.again({ grid: fix.cells });

@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import type { CageOptions, CageState, Problem } from "../contract";
 import { SLIDERS } from "../defaults";
-import { isCageSparse, type Mend, mendOf } from "../derived";
+import { fixOf, isCageSparse, type ProblemFix } from "../derived";
 import { count, percent } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -105,20 +105,22 @@ function CageBadge({ cage, check }: { cage: CageState; check: readonly Problem[]
 }
 
 /** Label of the button that fixes `count` faults. */
-export function sayMend(fix: Mend, count: number): string {
+export function fixLabel(fix: ProblemFix, count: number): string {
   if (fix.kind === "repair") return T.cage.repairs[fix.repair](count);
   return fix.kind === "grid" ? T.cage.bindFiner(fix.cells) : T.panel.newCage;
 }
 
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
-  const fix = mendOf(problem);
+  const fix = fixOf(problem);
   // If the fix is a finer grid, choosing one solves the problem.
   const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return (
     <div class={`problem-card ${problem.severity}`}>
       <Icon name={problem.severity === "note" ? "info" : "warning"} />
       <Say kind="grow" text={sentence(problem.message)} />
-      {fix && !isDone && <Button label={sayMend(fix, problem.count)} onClick={() => app.cage.mend(fix)} />}
+      {fix && !isDone && (
+        <Button label={fixLabel(fix, problem.count)} onClick={() => app.cage.applyFix(fix)} />
+      )}
       {isDone && <Badge kind="good" icon="check" text={T.cage.fineEnough} />}
     </div>
   );

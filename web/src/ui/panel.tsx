@@ -2,11 +2,11 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { cageBroken, hasUnmadeCage, mendOf } from "../derived";
+import { cageBroken, fixOf, hasUnmadeCage } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
-import { CagePanel, sayMend } from "./cage";
+import { CagePanel, fixLabel } from "./cage";
 import { Button } from "./controls";
 import { ExportPanel } from "./export";
 import type { IconName } from "./icons";
@@ -75,9 +75,9 @@ function cageAction(state: AppState, app: App): Action | undefined {
   if (!state.cage) return make(T.panel.makeCage);
   if (!cageBroken(state) || hasUnmadeCage(state)) return undefined;
   const found = state.check?.find((problem) => problem.severity === "error");
-  const fix = found && mendOf(found);
+  const fix = found && fixOf(found);
   if (!fix) return make(T.panel.newCage);
-  return { label: sayMend(fix, found.count), icon: "patch", run: () => app.cage.mend(fix) };
+  return { label: fixLabel(fix, found.count), icon: "patch", run: () => app.cage.applyFix(fix) };
 }
 
 const BODIES: Record<StepName, (props: { app: App }) => preact.JSX.Element> = {

@@ -228,22 +228,22 @@ it.each([
 
 it("a problem's button repairs, refines the grid, or generates another cage", async () => {
   const { cage, asked, grids, problems, store, height } = page();
-  cage.mend({ kind: "grid", cells: 128 });
+  cage.applyFix({ kind: "grid", cells: 128 });
   expect(grids).toEqual([128]);
-  cage.mend({ kind: "repair", repair: "grow" });
+  cage.applyFix({ kind: "repair", repair: "grow" });
   await settled();
   expect([asked[0]?.input, store.get().busy]).toEqual(["grow", "Repairing the cage"]);
   asked[0]?.reject(named("Error", "growing did not help"));
   await settled();
   expect(problems).toMatchObject([{ title: "The repair failed", message: "Growing did not help." }]);
   expect(store.get().busy).toBeNull();
-  cage.mend({ kind: "repair", repair: "weld" });
+  cage.applyFix({ kind: "repair", repair: "weld" });
   await settled();
   asked[1]?.resolve(cageOf(8, 7));
   await settled();
   expect(height()).toBe(7);
   store.set({ cageSource: "file" });
-  cage.mend({ kind: "regenerate" });
+  cage.applyFix({ kind: "regenerate" });
   await settled();
   expect([asked[2]?.kind, store.get().cageSource]).toEqual(["cage", "auto"]);
 });

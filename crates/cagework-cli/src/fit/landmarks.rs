@@ -1,5 +1,6 @@
 //! Reads the JSON file of `cagework fit --landmarks`.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use cagework_core::Weights;
@@ -45,7 +46,7 @@ type SurfacePoint = ([u32; 3], [f64; 3]);
 ///
 /// # Errors
 /// If the file cannot be read, its JSON is invalid, or an index or number is out of range.
-pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliError> {
+pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals<'static>, CliError> {
     let bytes = read(path)?;
     let text = without_byte_order_mark(&bytes);
     let all: Vec<LandmarkJson> =
@@ -103,6 +104,7 @@ pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliErr
             to.len()
         )
     });
+    let weights = Cow::Owned(weights);
     Ok(Goals { weights, importance, to, notices: outside_notice.into_iter().chain(affine_notice).collect() })
 }
 

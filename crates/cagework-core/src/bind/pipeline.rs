@@ -355,12 +355,11 @@ fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
         ));
     }
     if let (n @ 1.., Some(first)) = (controls.reaching().len(), controls.reaching().first()) {
-        let them = if n == 1 { "it" } else { "them" };
+        let [from, reach, them] = if n == 1 { ["", "reaches", "it"] } else { ["from ", "reach", "them"] };
         notices.push(format!(
-            "{} inside (element {first}) {} through the cage, whose surface keeps its own values there: use a radius \
-             below {radius:.3e}, or move {them} inwards.",
+            "{} inside ({from}element {first}) {reach} through the cage, whose surface keeps its own values there: use a \
+             radius below {radius:.3e}, or move {them} inwards.",
             counted(n, "ball or tube", "balls and tubes"),
-            if n == 1 { "reaches" } else { "reach" },
         ));
     }
     if let (n @ 1.., Some(first)) = (inner.unused().len(), inner.unused().first()) {

@@ -298,7 +298,7 @@ impl Drag {
 
     /// Part of the positions of the grabs and pins that is not linear in the cage: the effect of rotated bones, and
     /// constant offsets. `[n_handles, 3]`, object units
-    pub(super) fn bends(&self) -> DMatrix<f64> {
+    pub(super) fn nonlinear_part(&self) -> DMatrix<f64> {
         self.places() - &self.handles * self.cage_matrix()
     }
 

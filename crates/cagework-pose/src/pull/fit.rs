@@ -99,9 +99,9 @@ impl Pull {
     /// `shares`: weight `m_k` of each point, scaled to sum to 1; a point with the share 0 is ignored. `to`: targets,
     /// object units.
     ///
-    /// The solver needs positions that are linear in the cage, as with [`Frames::folded`]. Rotated bones and constant
-    /// offsets add the rest. It is computed from the fitted pose and subtracted from the targets, and the fit repeated
-    /// until the rest no longer changes.
+    /// The solver needs positions that are linear in the cage ([`Frames::folded`]). Rotated bones and constant offsets
+    /// add a part that is not linear. It is computed in the fitted pose and subtracted from the targets, and the fit is
+    /// repeated until this part no longer changes.
     ///
     /// # Errors
     /// [`PullError`]: the weights belong to another cage, lengths differ, no point has a target, or numbers are out of
@@ -127,10 +127,10 @@ impl Pull {
         }
         for _ in 1..MAX_FITS {
             let pose: Vec<Vec3> = fitted.cage.iter().map(|p| p.as_vec3()).collect();
-            let rest = deform_bound(weights, frames, &pose);
-            let rest =
-                rest.iter().zip(deform_vertices(&linear, &pose)).map(|(exact, linear)| *exact - linear);
-            let next: Vec<Vec3> = to.iter().zip(rest).map(|(to, rest)| *to - rest).collect();
+            let exact = deform_bound(weights, frames, &pose);
+            let pairs = exact.iter().zip(deform_vertices(&linear, &pose));
+            let next: Vec<Vec3> =
+                to.iter().zip(pairs).map(|(to, (at, linear))| *to - (*at - linear)).collect();
             let pairs = next.iter().zip(&shifted).zip(shares).filter(|(_, share)| **share > 0.0);
             let change = pairs.map(|((a, b), _)| f64::from(a.distance(*b))).fold(0.0, f64::max);
             if change <= MIN_TARGET_CHANGE * self.size || !change.is_finite() {

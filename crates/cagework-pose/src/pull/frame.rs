@@ -131,7 +131,7 @@ impl Drag {
     fn step(&self) -> DVector<f64> {
         let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
-        let pulled = &self.targets - self.bends() - &self.handles * &free;
+        let pulled = &self.targets - self.nonlinear_part() - &self.handles * &free;
         let fitted = free + &self.spread * (&self.hold * pulled);
         DVector::from_column_slice(fitted.as_slice())
     }
