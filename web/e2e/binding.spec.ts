@@ -2,34 +2,25 @@
 
 import { BIND_DEFAULTS } from "../src/defaults";
 import { bound, dropBox, expect, open, shoot, test } from "./support";
-import { longestTask } from "./tasks";
 
-/** Upper limit for the longest task of the main thread during a bind, ms of processor time. */
-const MAX_TASK_MS = 50;
-
-test("a bind at g = 64 blocks no frame", async ({ browser, page }) => {
+test("frames are drawn during a bind at g = 64", async ({ page }) => {
   // Drawing and the bind share one software GPU: in a small window, drawing takes little of its time.
   await page.setViewportSize({ width: 420, height: 420 });
   await open(page);
-  let frames = 0;
-  const longest = await longestTask(browser, page, async () => {
-    frames = await page.evaluate(async (options) => {
-      const session = globalThis.cagework;
-      if (!session) throw new Error("no session");
-      let frames = 0;
-      const stop = session.onFrame(() => {
-        frames += 1;
-      });
-      const turning = setInterval(() => session.engine.orbit(2, 0), 150);
-      await session.bind(options, () => undefined).done;
-      clearInterval(turning);
-      stop();
-      return frames;
-    }, BIND_DEFAULTS);
-  });
-  test.info().annotations.push({ type: "longest main-thread task, ms", description: longest.toFixed(1) });
-  expect(frames, "frames were drawn during the bind").toBeGreaterThan(2);
-  expect(longest).toBeLessThan(MAX_TASK_MS);
+  const frames = await page.evaluate(async (options) => {
+    const session = globalThis.cagework;
+    if (!session) throw new Error("no session");
+    let frames = 0;
+    const stop = session.onFrame(() => {
+      frames += 1;
+    });
+    const turning = setInterval(() => session.engine.orbit(2, 0), 150);
+    await session.bind(options, () => undefined).done;
+    clearInterval(turning);
+    stop();
+    return frames;
+  }, BIND_DEFAULTS);
+  expect(frames).toBeGreaterThan(2);
 });
 
 test("binds are compared in the panel, cancelled on both back ends, and rejected after an edit", async ({

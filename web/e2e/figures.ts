@@ -8,7 +8,7 @@ import { gzipSync } from "node:zlib";
 import { type Browser, expect, type Page, test } from "@playwright/test";
 import { torus } from "./models";
 import { bound } from "./support";
-import { longestTask } from "./tasks";
+import { timesOf } from "./tasks";
 
 const SIZES = [30_000, 200_000, 650_000];
 
@@ -31,7 +31,7 @@ async function measured(
   work: () => Promise<void>,
 ): Promise<void> {
   const start = performance.now();
-  const longest = await longestTask(browser, page, work);
+  const { longest } = await timesOf(browser, page, work);
   const seconds = (performance.now() - start) / 1000;
   const memory = await memoryOf(browser);
   console.log(

@@ -1,4 +1,4 @@
-/** Measures tasks of the page's main thread. */
+/** Measures tasks of the page's threads. */
 
 import type { Browser, Page } from "@playwright/test";
 
@@ -12,20 +12,32 @@ interface TraceEvent {
   readonly args?: { readonly name?: string };
 }
 
-/** Runs `work` and returns the duration of the main thread's longest task, milliseconds of processor time. */
-export async function longestTask(browser: Browser, page: Page, work: () => Promise<void>): Promise<number> {
+export interface Times {
+  /** Duration of the main thread's longest task, milliseconds of processor time. */
+  readonly longest: number;
+  /** Duration of all tasks of the workers, milliseconds of processor time. */
+  readonly workers: number;
+}
+
+/** Runs `work` and measures the tasks of the page's threads meanwhile. */
+export async function timesOf(browser: Browser, page: Page, work: () => Promise<void>): Promise<Times> {
   await browser.startTracing(page, { categories: ["toplevel", "__metadata"] });
   await work();
   const trace: { traceEvents: TraceEvent[] } = JSON.parse((await browser.stopTracing()).toString());
-  const events = trace.traceEvents;
-  const mains = new Set(
-    events
-      .filter(({ name, args }) => name === "thread_name" && args?.name === "CrRendererMain")
-      .map(({ pid, tid }) => `${pid}:${tid}`),
+  const threads = new Map(
+    trace.traceEvents
+      .filter(({ name }) => name === "thread_name")
+      .map(({ pid, tid, args }) => [`${pid}:${tid}`, args?.name ?? ""]),
   );
-  const tasks = events.filter(
-    ({ ph, name, pid, tid }) => ph === "X" && name.endsWith("RunTask") && mains.has(`${pid}:${tid}`),
-  );
-  if (tasks.length === 0) throw new Error("the trace has no tasks of the main thread");
-  return Math.max(...tasks.map(({ tdur = 0 }) => tdur)) / 1000;
+  const durations = (thread: string) =>
+    trace.traceEvents
+      .filter(({ ph, name }) => ph === "X" && name.endsWith("RunTask"))
+      .filter(({ pid, tid }) => threads.get(`${pid}:${tid}`) === thread)
+      .map(({ tdur = 0 }) => tdur / 1000);
+  const main = durations("CrRendererMain");
+  if (main.length === 0) throw new Error("the trace has no tasks of the main thread");
+  return {
+    longest: Math.max(...main),
+    workers: durations("DedicatedWorker thread").reduce((sum, duration) => sum + duration, 0),
+  };
 }
