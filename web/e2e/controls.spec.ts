@@ -1,4 +1,4 @@
-/** Smooth cages and interior controls, tested with a worm in a large box. */
+/** Smooth cages and inner controls, tested with a worm in a large box. */
 
 import type { Page } from "@playwright/test";
 import type { CageControls } from "../src/contract";
@@ -32,7 +32,7 @@ function cage(): Uint8Array {
 const controls = (page: Page): Promise<CageControls | undefined> =>
   page.evaluate(() => globalThis.cagework?.engine.cageArrays().controls);
 
-/** Waits until the model is bound with `smooth` subdivision steps and `inner` interior controls. */
+/** Waits until the model is bound with `smooth` subdivision steps and `inner` inner controls. */
 async function boundTo(page: Page, smooth: number, inner: number): Promise<void> {
   await expect.poll(() => controls(page)).toMatchObject({ smooth, inner });
   await bound(page);
@@ -51,7 +51,7 @@ async function click(page: Page, place: [number, number, number]): Promise<void>
 /** Returns the point of the worm's axis at height y. */
 const axis = (y: number): [number, number, number] => [0.3 * Math.sin(1.5 * y), y, 0];
 
-test("a smooth cage and interior controls are bound, posed, undone and saved", async ({ page }) => {
+test("a smooth cage and inner controls are bound, posed, undone and saved", async ({ page }) => {
   await openWith(page, [
     { name: "worm.glb", bytes: await glb() },
     { name: "worm-cage.obj", bytes: cage() },

@@ -141,7 +141,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
     /** Opens the file dialog, fits the clips of the chosen files to the skeleton, and downloads them. */
     chooseClips: () => choose(CLIPS, false, (list) => void exports.clips(list)),
-    /** Opens the file dialog, and reads interior controls from the chosen OBJ file. */
+    /** Opens the file dialog, and reads inner controls from the chosen OBJ file. */
     chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
     /** Opens the first sample. The open work stays saved in the browser. */
     startFresh,

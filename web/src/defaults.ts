@@ -1,6 +1,6 @@
 /** Defaults and ranges of options. They are generated from Rust's definitions, which document them. */
 
-import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generated";
+import { BIND_DEFAULTS, type BindOptions, USUAL_SOLVERS } from "@cagework/core/contract/generated";
 
 export * from "@cagework/core/contract/generated";
 
@@ -11,4 +11,8 @@ export const clamped = (
 ): number => Math.min(max, Math.max(min, value));
 
 /** Options of the published method (Joshi et al. 2007, as K. Smith describes it; see docs/method.md). */
-export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };
+export const PAPER_DEFAULTS: BindOptions = {
+  ...BIND_DEFAULTS,
+  method: "classic",
+  solver: USUAL_SOLVERS.classic,
+};

@@ -68,7 +68,7 @@ export function shapeFormatOf({ model, shapeFormat }: AppState): ShapeFormat {
   return formats.includes(shapeFormat) ? shapeFormat : (formats[0] ?? shapeFormat);
 }
 
-/** Number of vertices and interior controls of the cage. */
+/** Number of vertices and inner controls of the cage. */
 export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }

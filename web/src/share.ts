@@ -11,10 +11,10 @@ export interface SharedView {
   readonly scene: Partial<SceneOptions>;
 }
 
-/** Smoothing of the cage, and its interior controls with their rest positions. */
+/** Smoothing of the cage, and its inner controls with their rest positions. */
 export interface SharedControls {
   readonly controls: CageControls;
-  /** Rest positions of the interior controls, object units. `[n_inner, 3]` */
+  /** Rest positions of the inner controls, object units. `[n_inner, 3]` */
   readonly inner: readonly number[];
 }
 
@@ -25,7 +25,7 @@ export interface ShareLink {
   /** The pose, encoded by `Engine.encodePose`. */
   pose?: Uint8Array;
   seen?: SharedView;
-  /** Undefined for a cage without smoothing and without interior controls. */
+  /** Undefined for a cage without smoothing and without inner controls. */
   controls?: SharedControls;
   /** Index of the clip that plays. */
   clip?: number;
@@ -86,7 +86,7 @@ function parseClip(text: string): number {
   return Number(text);
 }
 
-/** Decodes interior controls. Checks only the structure of the JSON; the engine checks the values. */
+/** Decodes inner controls. Checks only the structure of the JSON; the engine checks the values. */
 function parseControls(json: Uint8Array): SharedControls {
   const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
   if (!said?.controls || !Array.isArray(said.inner)) throw new PageError(T.link.unreadable.controls);

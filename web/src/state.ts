@@ -115,7 +115,7 @@ export const MODEL_STATE = {
   memory: 0 as number | Message,
   slice: { axis: 2, position: 0.5, busy: false } as Slice,
   boxArmed: false,
-  /** Kind of interior control that clicks add; null for none. */
+  /** Kind of inner control that clicks add; null for none. */
   placing: null as InnerKind | null,
   ortho: false,
   /** Label of the gesture in progress; null without one. */

@@ -106,7 +106,7 @@ export function cageOf(n: number, height = 0): CheckedCage {
   return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check: [] };
 }
 
-/** Controls of a cage without smoothing and without interior controls. */
+/** Controls of a cage without smoothing and without inner controls. */
 export const PLAIN_CONTROLS: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
 export const OPENED_FILE: OpenedFile = { model: MODEL, check: null, settings: null, notices: [] };

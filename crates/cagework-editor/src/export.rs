@@ -288,13 +288,13 @@ impl Document {
         Ok(write_cage_obj(&self.models.up().mesh_turned_back(&mesh), self.models.origin()))
     }
 
-    /// Exports the interior controls in the current pose, as OBJ.
+    /// Exports the inner controls in the current pose, as OBJ.
     ///
     /// # Errors
-    /// If the cage has no interior controls.
+    /// If the cage has no inner controls.
     pub fn controls_obj(&self) -> Result<Vec<u8>, BoundError> {
         if self.cage.controls.inner == 0 {
-            return Err(BoundError::Missing { what: "interior control", how: "add one first" });
+            return Err(BoundError::Missing { what: "inner control", how: "add one first" });
         }
         let positions = self.models.up().turned_back(&self.pose[self.cage.n_cage()..]).into_owned();
         let elements = self.cage.controls.elements.clone();

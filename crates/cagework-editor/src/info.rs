@@ -191,7 +191,7 @@ impl CageInfo {
     }
 }
 
-/// The cage's properties, and its interior controls.
+/// The cage's properties, and its inner controls.
 #[derive(Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageState {

@@ -8,7 +8,7 @@ use crate::document::Document;
 /// Maximum number of vertex–triangle pairs that are tested at each pointer event.
 const WATCHED_PAIRS: usize = 250_000;
 
-/// A cage without its interior controls, and a sample of the models' vertices that is small enough to be tested at every
+/// A cage without its inner controls, and a sample of the models' vertices that is small enough to be tested at every
 /// pointer event.
 pub struct CageWatch {
     cage: ControlSet,
@@ -20,7 +20,7 @@ impl CageWatch {
     #[must_use]
     pub fn new(document: &Document) -> Option<Self> {
         let set = document.cage.set.as_ref().ok()?;
-        // Test against the cage alone: interior controls cut balls and tubes out of the enclosed volume.
+        // Test against the cage alone: inner controls cut balls and tubes out of the enclosed volume.
         let cage = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
             .unwrap_or_else(|_| ControlSet::plain(set.cage()));
         let surface = Controls::from(&cage).surface();

@@ -76,7 +76,7 @@ impl Binder {
         Ok(BindResult { weights, offsets: Offsets { frames, outside }, report: Some(report) })
     }
 
-    /// Computes closed-form coordinates of the cage, ignoring its interior controls. Arrays as for `bind`.
+    /// Computes closed-form coordinates of the cage, ignoring its inner controls. Arrays as for `bind`.
     ///
     /// # Errors
     /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
@@ -200,7 +200,7 @@ impl Binder {
         Ok(object(&check_smooth(&mesh, Some(&points(model)), Some(grid), smooth).problems))
     }
 
-    /// Repairs a cage. Arrays as for `checkCage`. The repaired cage has no interior controls.
+    /// Repairs a cage. Arrays as for `checkCage`. The repaired cage has no inner controls.
     ///
     /// # Errors
     /// If the arrays are not a polygon mesh, or the cage cannot be grown until it encloses the model.

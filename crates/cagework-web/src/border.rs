@@ -8,7 +8,7 @@ use std::fs;
 
 use cagework_cage::check::Problem;
 use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, HULL_TARGET};
-use cagework_core::options::Choice;
+use cagework_core::options::{Choice, Method};
 use cagework_core::report::BindReport;
 use cagework_core::{Coordinates, ProgressEvent};
 use cagework_editor::edit::{GestureView, SelectMode};
@@ -17,9 +17,10 @@ use cagework_editor::{
 };
 use cagework_gpu::render::colormap::Legend;
 use cagework_gpu::render::{CameraView, GizmoPart};
+use cagework_gpu::session::MAX_PICTURE;
 use cagework_io::{FormatFacts, ModelFormat};
 use cagework_pose::pull::DragOptions;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use ts_rs::{Config, TS, TypeVisitor};
 
 use crate::binder::BuiltSample;
@@ -132,6 +133,13 @@ fn generated_types_are_up_to_date() {
     }
     writeln!(text, " }} as const;\nexport const BOX_DIVISIONS = {BOX_DIVISIONS};").unwrap();
     writeln!(text, "export const HULL_TARGET = {HULL_TARGET};").unwrap();
+    let about = "Maximum length of a picture's longer side, pixels.";
+    writeln!(text, "/** {about} */\nexport const MAX_PICTURE = {MAX_PICTURE};").unwrap();
+    let solver = |method: Method| serde_json::to_value(method.usual_solver()).unwrap();
+    let solvers: Map<String, Value> =
+        Method::ALL.iter().map(|&(word, method)| (word.to_owned(), solver(method))).collect();
+    text += "/** Default solver of each method. */\n";
+    text += &constant("USUAL_SOLVERS", "Record<Method, Solver>", solvers);
     let mut table = "| option | unit | meaning and range |\n|---|---|---|\n".to_owned();
     for number in NUMBERS {
         writeln!(table, "| {} | {} | {} |", number.name, number.unit, number.about()).unwrap();

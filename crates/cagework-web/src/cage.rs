@@ -22,7 +22,7 @@ pub(crate) struct CageArrays {
     #[serde(with = "serde_wasm_bindgen::preserve")]
     #[cfg_attr(test, ts(type = "Uint32Array"))]
     pub(crate) corners: Uint32Array,
-    /// Subdivision and interior controls. Undefined for a new cage. The document then keeps its interior controls, as
+    /// Subdivision and inner controls. Undefined for a new cage. The document then keeps its inner controls, as
     /// far as they fit into the new cage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional, type = "CageControls | undefined"))]
@@ -48,7 +48,7 @@ impl CageArrays {
         }
     }
 
-    /// Vertices, interior controls and faces.
+    /// Vertices, inner controls and faces.
     ///
     /// # Errors
     /// If `corners` ends in the middle of a face.
@@ -69,7 +69,7 @@ impl CageArrays {
         Ok(Some(RestCage { notices: self.notices, ..cage }))
     }
 
-    /// The cage mesh without interior controls, and its number of subdivision steps.
+    /// The cage mesh without inner controls, and its number of subdivision steps.
     ///
     /// # Errors
     /// If `corners` ends in the middle of a face.
@@ -81,7 +81,7 @@ impl CageArrays {
     }
 }
 
-/// Reads a cage with its interior controls from a [`CageArrays`].
+/// Reads a cage with its inner controls from a [`CageArrays`].
 ///
 /// # Errors
 /// If the arrays are not a valid cage, or a control does not fit into the cage.

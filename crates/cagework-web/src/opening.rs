@@ -29,7 +29,7 @@ pub(crate) struct OpenContents {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct PoseArrays {
     pub(crate) name: String,
-    /// Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+    /// Positions of the cage's vertices and inner controls. `[n_controls, 3]`
     #[serde(with = "serde_wasm_bindgen::preserve")]
     #[cfg_attr(test, ts(type = "Float32Array"))]
     pub(crate) positions: Float32Array,

@@ -148,7 +148,7 @@ impl State {
         problems::marks(&self.faults, self.rest(), self.pose(), self.set().is_none())
     }
 
-    /// Creates the marks of grabs, pins and of an interior control that is being placed. Before a bind, grabs and pins
+    /// Creates the marks of grabs, pins and of an inner control that is being placed. Before a bind, grabs and pins
     /// are omitted.
     fn held_marks(&self) -> Marks {
         let GrabState { points, target, placed, .. } = &self.held;

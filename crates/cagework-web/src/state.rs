@@ -112,7 +112,7 @@ pub(crate) struct GpuKeys {
     pub(crate) floaters: Option<u64>,
 }
 
-/// Marks of grabs and of an interior control that is being placed, and the posed models for picking.
+/// Marks of grabs and of an inner control that is being placed, and the posed models for picking.
 #[derive(Default)]
 pub(crate) struct GrabState {
     /// Surface points that are grabbed or hovered. Pins are stored in the document.
@@ -121,7 +121,7 @@ pub(crate) struct GrabState {
     pub(crate) target: Option<Vec3>,
     /// How much each vertex of the model stays in place during the drag, 0 to 1. `[n_vertices]`
     pub(crate) stays: Option<Arc<Vec<f32>>>,
-    /// Points of an interior control that is being placed.
+    /// Points of an inner control that is being placed.
     pub(crate) placed: Vec<Vec3>,
     /// Vertices of the models in the pose `posed_for` of the cage. `[n_vertices]`
     pub(crate) posed: Vec<Vec3>,
@@ -138,7 +138,7 @@ impl State {
         &self.editor.document().cage
     }
 
-    /// Current positions of the cage's vertices and interior controls. `[n_controls]`
+    /// Current positions of the cage's vertices and inner controls. `[n_controls]`
     pub(crate) fn pose(&self) -> &[Vec3] {
         &self.editor.document().pose
     }
@@ -156,7 +156,7 @@ impl State {
         self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
     }
 
-    /// Rest positions of the cage's vertices and interior controls, and faces of the cage or draft.
+    /// Rest positions of the cage's vertices and inner controls, and faces of the cage or draft.
     pub(crate) fn rest(&self) -> &PolygonMesh {
         &self.cage().mesh
     }
@@ -423,7 +423,7 @@ impl State {
             if self.is_moved && self.is_on_gpu() {
                 let editing = self.editor.is_editing_rest();
                 let at_rest = self.view.original || editing;
-                // A session of closed-form coordinates has no interior controls.
+                // A session of closed-form coordinates has no inner controls.
                 let n = session.cage_positions().len();
                 session.pose(if at_rest { &self.rest().positions[..n] } else { &self.pose()[..n] });
                 if editing && !self.view.original {

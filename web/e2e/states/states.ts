@@ -359,6 +359,8 @@ async function start(): Promise<void> {
   const { session } = fake.ctx;
   const viewport = () => stage.viewport.getBoundingClientRect();
   const app = createApp({ store, session, tell, viewport });
+  // The browser has no saved work: reading it would remove the made-up work from the list.
+  app.works.refresh = () => Promise.resolve();
   let lose = (_: string) => {};
   const lost = createLost(stage.freshCanvas, () => {});
   let isBroken = false;

@@ -2,7 +2,7 @@
 
 import { indicesOf, optionsOf, originOf, pointsOf, poseOf, requireKnown, trianglesOf } from "./check";
 import type { BindOptions, CageArrays, NamedFile } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, USUAL_SOLVERS } from "./contract/generated";
 import type { Deformer } from "./pkg/cagework";
 import { createPool } from "./pool";
 import type { Package } from "./session/artifact";
@@ -157,9 +157,9 @@ function once<T>(open: () => Promise<T>): () => Promise<T> {
 
 const BIND_ON_CPU: BindOptions = { ...BIND_DEFAULTS, backend: "cpu" };
 
-/** Fills in missing options. The default solver of the classic method is Jacobi, as in the `cagework` command. */
+/** Fills in missing options. The default solver depends on the method. */
 function bindOptions(given: Partial<BindOptions>): BindOptions {
-  const solver = given.method === "classic" ? "jacobi" : BIND_ON_CPU.solver;
+  const solver = USUAL_SOLVERS[given.method ?? BIND_ON_CPU.method];
   return optionsOf({ ...BIND_ON_CPU, solver }, given);
 }
 

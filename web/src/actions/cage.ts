@@ -109,7 +109,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
 
   const actions = {
     /**
-     * Changes smoothing or interior controls of the cage as one undo step. If the number of controls changes, converts
+     * Changes smoothing or inner controls of the cage as one undo step. If the number of controls changes, converts
      * the poses to the changed cage. Shows an error and returns false if the change fails.
      */
     change,

@@ -1,4 +1,4 @@
-/** Interior controls of the cage: points, bones and sheets, added by clicks. Each change is one undo step. */
+/** Inner controls of the cage: points, bones and sheets, added by clicks. Each change is one undo step. */
 
 import type { Command, InnerKind, NamedFile, Session } from "../contract";
 import { triples } from "../points";
@@ -43,7 +43,7 @@ export function createControls(
       const label = T.did.controls.face;
       return change(label, () => engine().addSheet(Float32Array.from(center), label));
     },
-    /** Replaces the interior controls by those of an OBJ file: points (p), bones (l), sheets (f). */
+    /** Replaces the inner controls by those of an OBJ file: points (p), bones (l), sheets (f). */
     load: (files: readonly NamedFile[]): Promise<boolean> =>
       attempt(ctx, T.failed.controlsFile, async () => {
         const bytes = await files[0]?.file.arrayBuffer();
@@ -53,7 +53,7 @@ export function createControls(
       }),
     /** Sets the radius of points and bones, object units; null for the default, 1/32 of the cage's longest side. */
     setRadius: (radius: number | null): boolean => change(T.did.radius, { do: "set_radius", radius }),
-    /** Removes the selected interior controls. */
+    /** Removes the selected inner controls. */
     remove: (): boolean => remove({ do: "edit_rest", edit: "delete_vertex" }),
     clear: (): boolean => remove({ do: "replace_controls", positions: [], elements: [] }),
     /** Chooses the kind of control that clicks add, and shows the cage at rest. Null ends adding. */
@@ -94,7 +94,7 @@ export function createControls(
       actions.arm(null);
       if (drawn.length > 1) actions.add("line", drawn);
     },
-    /** Returns smoothing and interior controls for a link; undefined if the cage has neither. */
+    /** Returns smoothing and inner controls for a link; undefined if the cage has neither. */
     shared(): SharedControls | undefined {
       const controls = engine().cageArrays().controls;
       if (controls.smooth === 0 && controls.inner === 0) return undefined;

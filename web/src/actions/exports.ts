@@ -2,7 +2,7 @@
 
 import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
-import { EXPORT_TYPES } from "../defaults";
+import { EXPORT_TYPES, MAX_PICTURE } from "../defaults";
 import { isCapture, rigOf, shapeFormatOf } from "../derived";
 import { exportStem } from "../format";
 import { sentence } from "../strings";
@@ -25,9 +25,6 @@ const DOWNLOAD_PAUSE_MS = 250;
 
 /** Media type for formats that have no registered type. */
 const OCTETS = "application/octet-stream";
-
-/** Maximum length of a picture's longer side, pixels. */
-const MAX_PICTURE_SIDE = 8192;
 
 export function createExports(ctx: Context, project: Project, pull: Pick<Pulling, "released">) {
   const { engine } = ctx;
@@ -92,7 +89,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
   const picture = () => {
     const { width, height } = ctx.viewport();
     const { pictureScale, pictureAlone } = ctx.store.get();
-    const fit = Math.min(pictureScale, MAX_PICTURE_SIDE / Math.max(width, height, 1));
+    const fit = Math.min(pictureScale, MAX_PICTURE / Math.max(width, height, 1));
     return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), pictureAlone);
   };
 

@@ -1,4 +1,4 @@
-/** Options of the cage's smoothing and of its interior controls. */
+/** Options of the cage's smoothing and of its inner controls. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";

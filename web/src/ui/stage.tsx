@@ -77,7 +77,7 @@ function Mode({ app }: { app: App }) {
   );
 }
 
-/** Whether the bound surface is the cage itself, without smoothing and without interior controls. */
+/** Whether the bound surface is the cage itself, without smoothing and without inner controls. */
 function isPlain(cage: CageState | null): boolean {
   return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
 }

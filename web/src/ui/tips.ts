@@ -43,8 +43,20 @@ export function attachTips(): void {
   let about: Element | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
 
+  const place = (target: Element) => {
+    const box = target.getBoundingClientRect();
+    const { width, height } = tip.getBoundingClientRect();
+    const { x, y } = placeTip(box, { width, height }, isInColumn(target), {
+      width: innerWidth,
+      height: innerHeight,
+    });
+    tip.style.translate = `${x}px ${y}px`;
+  };
+  /** Moves the tip with its element when the contents of a dialog change. */
+  const resized = new ResizeObserver(() => about && place(about));
   const hide = () => {
     clearTimeout(timer);
+    resized.disconnect();
     if (about?.getAttribute("aria-describedby") === tip.id) about.removeAttribute("aria-describedby");
     about = null;
     if (tip.matches(":popover-open")) tip.hidePopover();
@@ -55,13 +67,9 @@ export function attachTips(): void {
     tip.textContent = text;
     if (!target.hasAttribute("aria-describedby")) target.setAttribute("aria-describedby", tip.id);
     if (!tip.matches(":popover-open")) tip.showPopover();
-    const box = target.getBoundingClientRect();
-    const { width, height } = tip.getBoundingClientRect();
-    const { x, y } = placeTip(box, { width, height }, isInColumn(target), {
-      width: innerWidth,
-      height: innerHeight,
-    });
-    tip.style.translate = `${x}px ${y}px`;
+    place(target);
+    const dialog = target.closest("dialog");
+    if (dialog) resized.observe(dialog);
   };
   const later = (target: Element | null, ms: number) => {
     if (target === about) return;

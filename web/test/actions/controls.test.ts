@@ -1,4 +1,4 @@
-/** Smooth cages and interior controls: their commands, and drawing bones by clicks. */
+/** Smooth cages and inner controls: their commands, and drawing bones by clicks. */
 
 import { expect, test } from "vitest";
 import { createBind } from "../../src/actions/bind";

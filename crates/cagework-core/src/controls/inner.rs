@@ -1,4 +1,4 @@
-//! Controls inside a cage: points, polylines and sheets (Joshi et al. 2007, "interior control structure").
+//! Controls inside a cage: points, polylines and sheets (Joshi et al. 2007, "inner control structure").
 //!
 //! On a grid, the influence of a point or line would depend on the cell size, as points and lines have zero capacity in
 //! space. Points are therefore balls and lines are tubes, with a radius.

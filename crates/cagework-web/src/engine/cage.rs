@@ -128,7 +128,7 @@ impl Engine {
         self.change(|state| state.editor.clear_history());
     }
 
-    /// The cage at rest, with its interior controls.
+    /// The cage at rest, with its inner controls.
     #[wasm_bindgen(js_name = cageArrays, unchecked_return_type = "CageArrays & { controls: CageControls }")]
     pub fn cage_arrays(&self) -> JsValue {
         self.read(|state| {
@@ -137,13 +137,13 @@ impl Engine {
         })
     }
 
-    /// Cage vertices and interior controls at rest. `[n_controls, 3]`
+    /// Cage vertices and inner controls at rest. `[n_controls, 3]`
     #[wasm_bindgen(js_name = restPositions)]
     pub fn rest_positions(&self) -> Vec<f32> {
         self.read(|state| flat(&state.rest().positions))
     }
 
-    /// Current positions of cage vertices and interior controls. `[n_controls, 3]`
+    /// Current positions of cage vertices and inner controls. `[n_controls, 3]`
     #[wasm_bindgen(js_name = cagePositions)]
     pub fn cage_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.pose()))

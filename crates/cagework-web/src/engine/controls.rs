@@ -1,4 +1,4 @@
-//! Methods that read, add and show interior controls.
+//! Methods that read, add and show inner controls.
 
 use cagework_core::{ControlError, InnerControls};
 use cagework_editor::Command;
@@ -14,7 +14,7 @@ use crate::options::READ_LIMIT;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Replaces the interior controls by the controls in an OBJ file, and adds a step to the history.
+    /// Replaces the inner controls by the controls in an OBJ file, and adds a step to the history.
     ///
     /// # Errors
     /// If the file cannot be read, or a control does not fit into the cage. The document is then unchanged.
@@ -63,7 +63,7 @@ impl Engine {
         self.step(Command::AddSheet { center, axes }, Some(label))
     }
 
-    /// Shows the points of an interior control that is being placed. `[n, 3]`
+    /// Shows the points of an inner control that is being placed. `[n, 3]`
     #[wasm_bindgen(js_name = showPlaced)]
     pub fn show_placed(&self, places: &[f32]) {
         self.change(|state| {

@@ -114,10 +114,10 @@ impl Engine {
         self.read(|state| Ok(state.editor.document().cage_obj()?))
     }
 
-    /// Exports the interior controls in the current pose, as OBJ.
+    /// Exports the inner controls in the current pose, as OBJ.
     ///
     /// # Errors
-    /// If the cage has no interior controls.
+    /// If the cage has no inner controls.
     #[wasm_bindgen(js_name = exportControls)]
     pub fn export_controls(&self) -> Answer<Vec<u8>> {
         self.read(|state| Ok(state.editor.document().controls_obj()?))

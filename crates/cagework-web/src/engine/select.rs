@@ -86,7 +86,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Selects all cage vertices and interior controls.
+    /// Selects all cage vertices and inner controls.
     #[wasm_bindgen(js_name = selectAll)]
     pub fn select_all(&self) {
         self.change_selection(|state| state.editor.selection.all());

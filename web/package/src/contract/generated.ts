@@ -264,7 +264,7 @@ positions: Float32Array,
  */
 corners: Uint32Array,
 /**
- * Subdivision and interior controls. Undefined for a new cage. The document then keeps its interior controls, as
+ * Subdivision and inner controls. Undefined for a new cage. The document then keeps its inner controls, as
  * far as they fit into the new cage.
  */
 controls?: CageControls | undefined,
@@ -346,7 +346,7 @@ clearance: number,
  */
 voxels: number, };
 /**
- * The cage's properties, and its interior controls.
+ * The cage's properties, and its inner controls.
  */
 export type CageState = {
 /**
@@ -929,7 +929,7 @@ points: Array<[number, number, number]>, };
  */
 export type PoseArrays = { name: string,
 /**
- * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+ * Positions of the cage's vertices and inner controls. `[n_controls, 3]`
  */
 positions: Float32Array, };
 /**
@@ -1453,3 +1453,7 @@ export const EXPORT_TYPES: Readonly<Record<string, string>> = { "glb": "model/gl
 export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, target: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, clearance: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, } as const;
 export const BOX_DIVISIONS = 2;
 export const HULL_TARGET = 24;
+/** Maximum length of a picture's longer side, pixels. */
+export const MAX_PICTURE = 8192;
+/** Default solver of each method. */
+export const USUAL_SOLVERS: Record<Method, Solver> = {"classic":"jacobi","embedded":"multigrid"};

@@ -51,7 +51,7 @@ export const status = {
     line: "Click each corner of the bone, then Done",
     face: "Click the model to put a sheet there",
   },
-  /** Handles are cage vertices and interior controls. */
+  /** Handles are cage vertices and inner controls. */
   manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
   reshaping: "Reshaping the cage",
   ready: "Ready",
