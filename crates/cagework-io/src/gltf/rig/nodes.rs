@@ -89,6 +89,13 @@ pub(super) struct Deformation<'a> {
     pub(super) up: DVec3,
 }
 
+impl Deformation<'_> {
+    /// The move of a node that the shared skeleton gives.
+    fn named_move(&self, node: usize) -> Option<NodeMove> {
+        self.named.and_then(|named| named.of_nodes[node])
+    }
+}
+
 /// Computes the deformation gradient at a node by central differences. `anchor`: index of the node's first point in
 /// `by`.
 pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
@@ -211,29 +218,100 @@ impl Rig<'_> {
             n_outside: 0,
             n_follow_parent: 0,
         };
-        let stays = given.joints == Joints::Stay;
-        if stays && given.rigid.is_empty() {
+        if given.joints == Joints::Stay && given.rigid.is_empty() {
             return moved;
         }
-        let mut anchor = vec![None; n];
-        // Nodes of rigid meshes follow the cage even if the skeleton stays.
-        let goes = |node: u32| !stays || given.rigid.contains_key(&node);
-        self.follows
-            .iter()
-            .filter(|(node, _)| goes(*node))
-            .for_each(|&(node, at)| anchor[node as usize] = Some(at));
-        let named = |i: usize| given.named.and_then(|named| named.of_nodes[i]);
-        let follows = |i: usize| anchor[i].is_some() || !stays && named(i).is_some();
+        let anchors = self.anchors(given);
+        let new = self.place(given, &anchors, &mut moved);
+        let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
+        if travels {
+            let ratios = self.ratios(given, &moved.moves);
+            // Joints that are missing in the shared skeleton get the factor of another joint.
+            let one = (0..n).find_map(|i| given.named_move(i)).map(|named| named.ratio);
+            for (i, ratio) in ratios.into_iter().enumerate() {
+                moved.moves[i].ratio = given.named_move(i).map(|named| named.ratio).or(one).unwrap_or(ratio);
+            }
+        }
         let old = &self.worlds.world;
-        let mut moves = vec![still; n];
+        for &(node, parent) in &self.worlds.order {
+            let i = node as usize;
+            let follows =
+                anchors[i].is_some() || given.joints != Joints::Stay && given.named_move(i).is_some();
+            if !follows {
+                continue;
+            }
+            let [above, above_new] =
+                [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
+            let from = local(&root.nodes[i]);
+            let NodeMove { ratio, is_top, .. } = moved.moves[i];
+            let moving = DMat3::from_diagonal(DVec3::splat(ratio));
+            if new[i] == old[i] && above == above_new {
+                if is_top && ratio != 1.0 {
+                    // A root that stays where it is, such as one on the floor outside the cage, travels with the
+                    // skeleton.
+                    let at = from.w_axis.truncate();
+                    moved.changes[i] =
+                        Some(NodeChange { from: at, to: at, still: moving, moving, turn: None });
+                }
+                continue;
+            }
+            let to = above_new.inverse() * new[i];
+            if !to.is_finite() {
+                continue;
+            }
+            moved.n_moved += 1;
+            let turns = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
+                || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
+            let turn = set_local(&mut moved.nodes[i], &mut json["nodes"][i], &to, turns);
+            // Bone lengths are relative to the parent's scale.
+            let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
+            let [t0, t1] = [from, to].map(|m| m.w_axis.truncate());
+            let still = if is_top {
+                moving
+            } else if t0.length().min(t1.length()) > MIN_BONE_LENGTH * self.diagonal / scale {
+                let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
+                DMat3::from_quat(turn) * (t1.length() / t0.length())
+            } else {
+                DMat3::IDENTITY
+            };
+            moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
+        }
+        if moved.n_moved > 0 {
+            let mut root = root.clone();
+            root.nodes = std::mem::take(&mut moved.nodes);
+            // This cannot fail: the hierarchy of the original document was checked and has not changed.
+            if let Ok(worlds) = Worlds::new(&root) {
+                moved.world = worlds.world;
+            }
+            moved.nodes = root.nodes;
+        }
+        moved
+    }
+
+    /// Index of the point that each node follows; `None` for the others. If the skeleton stays, only nodes of rigid
+    /// meshes follow the cage. `[n_nodes]`
+    fn anchors(&self, given: &Deformation<'_>) -> Vec<Option<usize>> {
+        let mut anchors = vec![None; self.held.len()];
+        let follows = |node| given.joints != Joints::Stay || given.rigid.contains_key(&node);
+        for &(node, at) in self.follows.iter().filter(|&&(node, _)| follows(node)) {
+            anchors[node as usize] = Some(at);
+        }
+        anchors
+    }
+
+    /// Computes the world transforms of all nodes after the deformation, and sets the moves and counts of `moved`,
+    /// except the ratios. `[n_nodes]`
+    fn place(
+        &self,
+        given: &Deformation<'_>,
+        anchors: &[Option<usize>],
+        moved: &mut NodeUpdate,
+    ) -> Vec<DMat4> {
+        let stays = given.joints == Joints::Stay;
+        let (old, moves) = (&self.worlds.world, &mut moved.moves);
+        let mut new = old.clone();
         // Whether the cage can move each node or one above it.
-        let mut movable = vec![false; n];
-        let mut new: Vec<DMat4> = Vec::from(old.as_slice());
-        let turn = |at: usize| {
-            let turns = given.joints == Joints::Turn;
-            let turn = turns.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
-            turn.unwrap_or(DMat3::IDENTITY)
-        };
+        let mut movable = vec![false; new.len()];
         for &(node, parent) in &self.worlds.order {
             let (i, parent) = (node as usize, parent.map(|p| p as usize));
             let is_below = parent.is_some_and(|p| movable[p]);
@@ -244,9 +322,10 @@ impl Rig<'_> {
                 moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
                 continue;
             }
+            let named = given.named_move(i).filter(|_| !stays);
             // A file that contains only clips has no vertices, and its points are not bound.
-            let anchor = anchor[i].filter(|_| !self.parts.is_empty());
-            let (by, turn) = match (named(i).filter(|_| !stays), anchor) {
+            let anchor = anchors[i].filter(|_| !self.parts.is_empty());
+            let (by, turn) = match (named, anchor) {
                 (Some(named), _) => {
                     (movable[i], moves[i].is_top) = (true, named.is_top);
                     (named.by, named.turn)
@@ -257,19 +336,21 @@ impl Rig<'_> {
                     moved.n_outside += usize::from(given.is_outside[at] && holds);
                     moved.n_follow_parent += usize::from(follows_parent);
                     movable[i] |= !follows_parent;
-                    // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a
-                    // chain, follow their parent.
+                    // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a chain,
+                    // follow their parent.
                     let by = if follows_parent {
                         parent.map_or(DVec3::ZERO, |p| moves[p].by)
                     } else {
                         given.by[at]
                     };
-                    (by, turn(at))
+                    let turns = given.joints == Joints::Turn;
+                    let turn = turns.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
+                    (by, turn.unwrap_or(DMat3::IDENTITY))
                 }
                 (None, None) => {
-                    moved.n_follow_parent += usize::from(follows(i));
+                    moved.n_follow_parent += usize::from(anchors[i].is_some());
                     if let Some(parent) = parent.filter(|&p| new[p] != old[p]) {
-                        new[i] = new[parent] * local(&root.nodes[i]);
+                        new[i] = new[parent] * local(&self.document.root.nodes[i]);
                         moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
                         moves[i].turn = moves[parent].turn;
                     }
@@ -284,88 +365,7 @@ impl Rig<'_> {
             let linear = turn * DMat3::from_mat4(old[i]);
             new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + by);
         }
-        let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
-        if travels {
-            let ratios = self.ratios(given, &moves);
-            // Joints that are missing in the shared skeleton get the factor of another joint.
-            let one = (0..n).find_map(named).map(|named| named.ratio);
-            for (i, ratio) in ratios.into_iter().enumerate() {
-                moves[i].ratio = named(i).map(|named| named.ratio).or(one).unwrap_or(ratio);
-            }
-        }
-        for &(node, parent) in &self.worlds.order {
-            let i = node as usize;
-            let [above, above_new] =
-                [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
-            let is_still = new[i] == old[i] && above == above_new;
-            if is_still && follows(i) && moves[i].is_top && moves[i].ratio != 1.0 {
-                // A root that stays where it is, such as one on the floor outside the cage, travels with the skeleton.
-                let [at, moving] = [local(&root.nodes[i]).w_axis.truncate(), DVec3::splat(moves[i].ratio)];
-                let moving = DMat3::from_diagonal(moving);
-                moved.changes[i] = Some(NodeChange { from: at, to: at, still: moving, moving, turn: None });
-            }
-            if !follows(i) || is_still {
-                continue;
-            }
-            let to = above_new.inverse() * new[i];
-            if !to.is_finite() {
-                continue;
-            }
-            let from = local(&root.nodes[i]);
-            let [t0, t1] = [from, to].map(|m| m.w_axis.truncate());
-            moved.n_moved += 1;
-            let of_json = &mut json["nodes"][i];
-            let node = &mut moved.nodes[i];
-            let mut turn = None;
-            if node.matrix.is_some() {
-                let matrix = to.as_mat4().to_cols_array();
-                of_json["matrix"] = json!(matrix);
-                node.matrix = Some(matrix);
-            } else {
-                let translation = t1.as_vec3().to_array();
-                of_json["translation"] = json!(translation);
-                node.translation = Some(translation);
-                let turned = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
-                    || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
-                // Use the rotation of the change only, since the node's own scale can mirror.
-                let change = DMat3::from_mat4(to) * DMat3::from_mat4(from).inverse();
-                if let Some(m) = rotation(change).filter(|_| turned) {
-                    let before = node
-                        .rotation
-                        .as_ref()
-                        .map_or(DQuat::IDENTITY, |r| DQuat::from_array(r.0.map(f64::from)).normalize());
-                    let after = (DQuat::from_mat3(&m) * before).normalize();
-                    let rotation = after.as_quat().to_array();
-                    of_json["rotation"] = json!(rotation);
-                    node.rotation = Some(UnitQuaternion(rotation));
-                    turn = Some(after * before.inverse());
-                }
-            }
-            // Bone lengths are relative to the parent's scale.
-            let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
-            let short = MIN_BONE_LENGTH * self.diagonal / scale;
-            let moving = DMat3::from_diagonal(DVec3::splat(moves[i].ratio));
-            let still = if moves[i].is_top {
-                moving
-            } else if t0.length().min(t1.length()) > short {
-                let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
-                DMat3::from_quat(turn) * (t1.length() / t0.length())
-            } else {
-                DMat3::IDENTITY
-            };
-            moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
-        }
-        moved.moves = moves;
-        if moved.n_moved > 0 {
-            let mut root = root.clone();
-            root.nodes = std::mem::take(&mut moved.nodes);
-            // This cannot fail: the hierarchy of the original document was checked and has not changed.
-            if let Ok(worlds) = Worlds::new(&root) {
-                moved.world = worlds.world;
-            }
-            moved.nodes = root.nodes;
-        }
-        moved
+        new
     }
 
     /// Computes the scale factors of clip translations, by node. All nodes of a skeleton share one factor; otherwise,
@@ -439,6 +439,30 @@ impl Rig<'_> {
         let skeletons = (0..n).map(|node| follows[node].then(|| top(&above, node)));
         (skeletons.collect(), n + 1)
     }
+}
+
+/// Sets the local transform of a node and of its JSON. A node with a matrix gets a matrix, another one a translation
+/// and, if it `turns`, a rotation. Returns the change of its rotation.
+fn set_local(node: &mut Node, json: &mut Value, to: &DMat4, turns: bool) -> Option<DQuat> {
+    if node.matrix.is_some() {
+        let matrix = to.as_mat4().to_cols_array();
+        json["matrix"] = json!(matrix);
+        node.matrix = Some(matrix);
+        return None;
+    }
+    // Use the rotation of the change only, since the node's own scale can mirror.
+    let change = DMat3::from_mat4(*to) * DMat3::from_mat4(local(node)).inverse();
+    let translation = to.w_axis.truncate().as_vec3();
+    json["translation"] = vector(translation);
+    node.translation = Some(translation.to_array());
+    let turn = rotation(change).filter(|_| turns)?;
+    let before = node.rotation.as_ref().map(|r| DQuat::from_array(r.0.map(f64::from)).normalize());
+    let before = before.unwrap_or(DQuat::IDENTITY);
+    let after = (DQuat::from_mat3(&turn) * before).normalize();
+    let rotation = after.as_quat().to_array();
+    json["rotation"] = json!(rotation);
+    node.rotation = Some(UnitQuaternion(rotation));
+    Some(after * before.inverse())
 }
 
 /// Nodes with this name; unnamed nodes are called "node 7".

@@ -57,54 +57,90 @@ pub(super) fn append<'p>(
         }
     }
     // Process poses one at a time: gradients need more memory than the output.
-    let mut moved = vec![BTreeSet::new(); poses.len()];
-    for (pose, moved) in poses.iter().zip(&mut moved) {
-        let by = held(rig, rigid, &(pose.by)());
-        let turned = SurfaceGradients::new(triangles, &by);
-        for part in &rig.parts {
-            let mesh = edit.mesh_of(&part.instance);
-            let number = part.primitive as usize;
-            let shape = rig.shape(part, &turned, &part.frame)?;
-            let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
-            let positions: Vec<[f32; 3]> = (0..part.local.len())
-                .map(|v| {
-                    let delta = inverse(v) * by[part.first + v];
-                    if delta.is_finite() { delta.as_vec3().to_array() } else { [0.0; 3] }
-                })
-                .collect();
-            if positions.iter().flatten().any(|&x| x != 0.0) {
-                moved.insert(mesh);
-            }
-            let mut target = json!({ "POSITION": edit.write_deltas(None, &positions) });
-            let before = rig.normals(part)?;
-            if let (Some(shape), Some(before)) = (shape.and_then(|shape| shape.normals), before) {
-                let deltas: Vec<[f32; 3]> = shape
-                    .iter()
-                    .zip(before)
-                    .map(|(a, b): (&DVec3, DVec3)| (*a - b).as_vec3().to_array())
-                    .collect();
-                target["NORMAL"] = edit.write_deltas(None, &deltas).into();
-            }
-            push(&mut edit.json["meshes"][mesh]["primitives"][number], "targets", target);
-        }
-    }
+    let moved = poses
+        .iter()
+        .map(|pose| append_target(rig, edit, triangles, &held(rig, rigid, &(pose.by)())))
+        .collect::<Result<Vec<_>, _>>()?;
     let names: Vec<&str> = poses.iter().map(|pose| pose.name).collect();
     let defaults: Vec<f32> = poses.iter().map(|pose| pose.default).collect();
     for (&mesh, &n_before) in &meshes {
-        pad(&mut edit.json["meshes"][mesh]["weights"], n_before, &defaults);
-        let mesh = &mut edit.json["meshes"][mesh];
-        let mut all: Vec<Value> = target_names(mesh).as_array().cloned().unwrap_or_default();
-        all.extend((all.len()..n_before).map(|k| json!(format!("target {k}"))));
-        all.truncate(n_before);
-        all.extend(names.iter().map(|&name| json!(name)));
-        for extras in name_lists_of_primitives(mesh) {
-            extras.insert("targetNames".into(), all.clone().into());
+        append_names(&mut edit.json["meshes"][mesh], n_before, &names);
+    }
+    pad_weights(rig, edit, &meshes, &defaults);
+    if let Some(timeline) = timeline {
+        play(rig, edit, &meshes, timeline);
+    }
+    let nodes: BTreeSet<usize> =
+        rig.document.instances.iter().filter_map(|instance| Some(instance.node? as usize)).collect();
+    let targets = |(k, moved): (usize, &BTreeSet<usize>)| {
+        let target = |&node: &usize| {
+            let mesh = edit.json["nodes"][node]["mesh"].as_u64()? as usize;
+            moved.contains(&mesh).then(|| PoseTarget { node, mesh, target: meshes[&mesh] + k })
+        };
+        (poses[k].name, nodes.iter().filter_map(target).collect())
+    };
+    Ok(moved.iter().enumerate().map(targets).collect())
+}
+
+/// Appends one morph target to every part, for the displacements `by` of all points. Returns the meshes that it moves.
+fn append_target(
+    rig: &Rig<'_>,
+    edit: &mut Edit<'_>,
+    triangles: &[[u32; 3]],
+    by: &[DVec3],
+) -> Result<BTreeSet<usize>, WriteError> {
+    let mut moved = BTreeSet::new();
+    let turned = SurfaceGradients::new(triangles, by);
+    for part in &rig.parts {
+        let mesh = edit.mesh_of(&part.instance);
+        let number = part.primitive as usize;
+        let shape = rig.shape(part, &turned, &part.frame)?;
+        let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
+        let positions: Vec<[f32; 3]> = (0..part.local.len())
+            .map(|v| {
+                let delta = inverse(v) * by[part.first + v];
+                if delta.is_finite() { delta.as_vec3().to_array() } else { [0.0; 3] }
+            })
+            .collect();
+        if positions.iter().flatten().any(|&x| x != 0.0) {
+            moved.insert(mesh);
         }
-        let extras = &mut mesh["extras"];
-        if !extras.is_object() {
-            *extras = json!({});
+        let mut target = json!({ "POSITION": edit.write_deltas(None, &positions) });
+        let before = rig.normals(part)?;
+        if let (Some(shape), Some(before)) = (shape.and_then(|shape| shape.normals), before) {
+            let deltas: Vec<[f32; 3]> = shape
+                .iter()
+                .zip(before)
+                .map(|(a, b): (&DVec3, DVec3)| (*a - b).as_vec3().to_array())
+                .collect();
+            target["NORMAL"] = edit.write_deltas(None, &deltas).into();
         }
-        extras["targetNames"] = all.into();
+        push(&mut edit.json["meshes"][mesh]["primitives"][number], "targets", target);
+    }
+    Ok(moved)
+}
+
+/// Appends the names of targets to those of the first `n_before` targets of a mesh.
+fn append_names(mesh: &mut Value, n_before: usize, names: &[&str]) {
+    let mut all: Vec<Value> = target_names(mesh).as_array().cloned().unwrap_or_default();
+    all.extend((all.len()..n_before).map(|k| json!(format!("target {k}"))));
+    all.truncate(n_before);
+    all.extend(names.iter().map(|&name| json!(name)));
+    for extras in name_lists_of_primitives(mesh) {
+        extras.insert("targetNames".into(), all.clone().into());
+    }
+    let extras = &mut mesh["extras"];
+    if !extras.is_object() {
+        *extras = json!({});
+    }
+    extras["targetNames"] = all.into();
+}
+
+/// Appends the default weights of the new targets to the weights of meshes and nodes, and to the tracks of clips.
+/// `meshes`: number of older targets of each mesh.
+fn pad_weights(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, defaults: &[f32]) {
+    for (&mesh, &n_before) in meshes {
+        pad(&mut edit.json["meshes"][mesh]["weights"], n_before, defaults);
     }
     let targets_of = |json: &Value, node: usize| {
         let mesh = json["nodes"][node]["mesh"].as_u64()? as usize;
@@ -114,7 +150,7 @@ pub(super) fn append<'p>(
         let Some(n_before) = targets_of(&edit.json, node) else { continue };
         let weights = &mut edit.json["nodes"][node]["weights"];
         if weights.is_array() {
-            pad(weights, n_before, &defaults);
+            pad(weights, n_before, defaults);
         } else if let Some(node) = edit.json["nodes"][node].as_object_mut() {
             // Remove the null member that indexing the JSON has created.
             node.shift_remove("weights");
@@ -145,19 +181,6 @@ pub(super) fn append<'p>(
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
         }
     }
-    if let Some(timeline) = timeline {
-        play(rig, edit, &meshes, timeline);
-    }
-    let nodes: BTreeSet<usize> =
-        rig.document.instances.iter().filter_map(|instance| Some(instance.node? as usize)).collect();
-    let targets = |(k, moved): (usize, &BTreeSet<usize>)| {
-        let target = |&node: &usize| {
-            let mesh = edit.json["nodes"][node]["mesh"].as_u64()? as usize;
-            moved.contains(&mesh).then(|| PoseTarget { node, mesh, target: meshes[&mesh] + k })
-        };
-        (poses[k].name, nodes.iter().filter_map(target).collect())
-    };
-    Ok(moved.iter().enumerate().map(targets).collect())
 }
 
 /// Returns the displacements of all points in a pose, with the meshes of rigid nodes moved rigidly. Ends of morph targets
