@@ -1,7 +1,7 @@
 //! Difficult cages: parts that share faces or overlap, re-entrant edges, bent quads, and faces that the grid cannot
 //! resolve; also the threshold of sparse weights. Figures at g = 64 are in `docs/notes/any-cage.md`.
 
-use cagework_core::{Cage, PolygonMesh, Weights};
+use cagework_core::{Bounds, Cage, PolygonMesh, Weights, subdivided_box};
 use cagework_tests::cages::{cage, cuboid, icosphere, l_shape, moved, sphere, together};
 use cagework_tests::{RandomGenerator, dense, points};
 use glam::{DVec3, Quat, Vec3};
@@ -262,7 +262,10 @@ pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &Ba
     // The bar is rotated, so that grid lines cross its adjacent sides and not only its opposite sides.
     let turn = RandomGenerator::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
-    for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {
+    // The sides of the plate are strips of half a cell, which lie between two lines over their whole length.
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(4.0, 3.0, 0.1) };
+    let plate = cage(&subdivided_box(bounds, 0.0, [4, 4, 4]));
+    for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16), (plate, 83)] {
         let points = points::inside(&cage, 50, 78);
         let notice = |grid: u32| {
             let report = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, 1e-5)).report;

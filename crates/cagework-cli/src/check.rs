@@ -104,8 +104,8 @@ fn text(summary: &CheckSummary) -> String {
     if check.valid {
         out.push_str("valid as a cage");
         match check.encloses {
-            Some(true) => out.push_str(", and the whole model is inside"),
-            Some(false) => out.push_str(", but part of the model is outside"),
+            Some(true) => out.push_str(", and all vertices of the model are inside"),
+            Some(false) => out.push_str(", but some vertices of the model are outside"),
             None => {}
         }
         out.push('\n');

@@ -87,6 +87,11 @@ impl<'a> Controls<'a> {
         self.set.map_or(&[], ControlSet::reaching)
     }
 
+    /// As [`ControlSet::distance_of_reaching`]; infinite if nothing reaches through.
+    pub(crate) fn distance_of_reaching(&self) -> f64 {
+        self.set.map_or(f64::INFINITY, ControlSet::distance_of_reaching)
+    }
+
     /// Radius of balls and tubes, object units; `None` without inner controls.
     #[must_use]
     pub fn inner_radius(&self) -> Option<f32> {

@@ -8,23 +8,44 @@ use glam::DVec3;
 /// usually intended.
 pub const MAX_EDGES: usize = 64;
 
-/// Finds the closed loops of edges. Each loop has the direction of the majority of its edges. Ignores edges that are in
-/// no loop.
-pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+/// Finds the closed loops of edges. Each edge has the direction in which a face that fills the hole traverses it, unless
+/// the face next to it is inverted; each loop has the direction of the majority of its edges. Ignores edges that are in
+/// no loop. `faces`: the faces around the holes, of vertices at `at`.
+pub fn loops(edges: &[[u32; 2]], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     // Store edges without direction, as a face next to the hole may be inverted.
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for &[from, to] in edges {
         next.entry(from).or_default().push(to);
         next.entry(to).or_default().push(from);
     }
+    let directed: HashSet<[u32; 2]> = edges.iter().copied().collect();
+    let normals = normals_where_holes_meet(&next, at, faces);
     let mut found = Vec::new();
     let starts: Vec<u32> = next.keys().copied().collect();
     for start in starts {
         while !next[&start].is_empty() {
             let mut path = vec![start];
             while let Some(from) = path.last().copied()
-                && let Some(to) = next.get_mut(&from).and_then(Vec::pop)
+                && let Some(ways) = next.get_mut(&from)
+                && !ways.is_empty()
             {
+                let before = path.len().checked_sub(2).map(|k| path[k]);
+                let angle = |to: u32| match (before, normals.get(&from)) {
+                    (Some(before), Some(&normal)) => {
+                        let [back, ahead] = [before, to].map(|v| at[v as usize] - at[from as usize]);
+                        clockwise(back, ahead, normal)
+                    }
+                    _ => 0.0,
+                };
+                // At a vertex where holes meet, the loop continues with the next edge around the vertex: the faces that
+                // fill the hole lie in between.
+                let rank = |to: u32| (u8::from(!directed.contains(&[from, to])), angle(to));
+                let order = |a: &usize, b: &usize| {
+                    let (a, b) = (rank(ways[*a]), rank(ways[*b]));
+                    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+                };
+                let best = (0..ways.len()).min_by(order).unwrap_or(0);
+                let to = ways.swap_remove(best);
                 if let Some(back) = next.get_mut(&to)
                     && let Some(k) = back.iter().position(|&v| v == from)
                 {
@@ -39,7 +60,6 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
         }
     }
     found.retain(|outline| outline.len() >= 3);
-    let directed: HashSet<[u32; 2]> = edges.iter().copied().collect();
     for outline in &mut found {
         let n = outline.len();
         let ahead = (0..n).filter(|&k| directed.contains(&[outline[k], outline[(k + 1) % n]])).count();
@@ -48,6 +68,45 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
         }
     }
     found
+}
+
+/// Sums of the unit normals of the faces around each vertex where holes meet.
+fn normals_where_holes_meet(
+    next: &BTreeMap<u32, Vec<u32>>,
+    at: &[DVec3],
+    faces: &[Vec<u32>],
+) -> HashMap<u32, DVec3> {
+    let meeting = next.iter().filter(|(_, ways)| ways.len() > 2);
+    let mut normals: HashMap<u32, DVec3> = meeting.map(|(&v, _)| (v, DVec3::ZERO)).collect();
+    if normals.is_empty() {
+        return normals;
+    }
+    for face in faces {
+        let normal = area_normal(face, at).normalize_or_zero();
+        for v in face {
+            if let Some(sum) = normals.get_mut(v) {
+                *sum += normal;
+            }
+        }
+    }
+    normals
+}
+
+/// Angle from one direction to another about a normal, clockwise as seen from its tip, in (0, 2 pi].
+fn clockwise(from: DVec3, to: DVec3, normal: DVec3) -> f64 {
+    let normal = normal.normalize_or(DVec3::Z);
+    let [flat_from, flat_to] = [from, to].map(|way| way.reject_from_normalized(normal));
+    let angle = normal.dot(to.cross(from)).atan2(flat_from.dot(flat_to));
+    if angle > 0.0 { angle } else { angle + std::f64::consts::TAU }
+}
+
+/// Newell's normal of a face, of twice its area. Its corners may not exist, as faces to be checked can have wrong
+/// indices.
+fn area_normal(face: &[u32], at: &[DVec3]) -> DVec3 {
+    let point = |i: u32| at.get(i as usize).copied().unwrap_or_default();
+    let Some(&first) = face.first() else { return DVec3::ZERO };
+    let corners = face.iter().zip(face.iter().cycle().skip(1));
+    corners.map(|(&c, &d)| (point(c) - point(first)).cross(point(d) - point(first))).sum()
 }
 
 /// Cost of a triangle that folds back onto the face behind one of its sides, as a multiple of the triangle's area, for
@@ -124,11 +183,8 @@ fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
             let b = face[(k + 1) % face.len()];
             let Some(&side) = sides.get(&key(a, b)) else { continue };
             let point = |i: u32| at.get(i as usize).copied().unwrap_or_default();
-            let corners = face.iter().zip(face.iter().cycle().skip(1));
-            // Newell's normal. The result does not depend on the face's orientation, which reverses both normal and
-            // side.
-            let normal: DVec3 =
-                corners.map(|(&c, &d)| (point(c) - point(a)).cross(point(d) - point(a))).sum();
+            // The result does not depend on the face's orientation, which reverses both normal and side.
+            let normal = area_normal(face, at);
             across[side] = normal.cross(point(b) - point(a)).normalize_or_zero();
         }
     }

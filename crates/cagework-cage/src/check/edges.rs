@@ -54,7 +54,8 @@ impl Edges {
             } else {
                 vec![Repair::FillHoles]
             };
-            let holes = fill::loops(&open);
+            let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+            let holes = fill::loops(&open, &at, &mesh.faces);
             let longest = holes.iter().map(Vec::len).max().unwrap_or(0);
             if holes.iter().all(|hole| hole.len() > fill::MAX_EDGES) {
                 fixes.retain(|&repair| repair != Repair::FillHoles);

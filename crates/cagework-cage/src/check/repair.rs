@@ -275,7 +275,7 @@ fn fill_holes(repaired: &mut RepairedMesh) {
         edges.groups().filter(|g| g.len() == 1).map(|g| ([g[0].lo, g[0].hi], g[0].face)).collect();
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
     let mut filled = 0;
-    for outline in fill::loops(&edges.open()) {
+    for outline in fill::loops(&edges.open(), &at, &mesh.faces) {
         let sides = outline.iter().zip(outline.iter().cycle().skip(1));
         let around = sides.filter_map(|(&a, &b)| behind.get(&[a.min(b), a.max(b)]));
         let around: Vec<Vec<u32>> = around.map(|&f| mesh.faces[f as usize].clone()).collect();

@@ -58,6 +58,29 @@ fn holes_are_reported_with_their_edges_and_filled() {
     assert_eq!(cage.notices(), [], "the new faces point outward");
 }
 
+/// A face hangs by its corners between four holes. A loop around the face and one around the holes would use the same
+/// edges.
+#[test]
+fn holes_that_meet_in_corners_are_filled_one_by_one() {
+    let mut mesh = box_mesh(3);
+    let is_middle = |face: &&Vec<u32>| {
+        let mut at = face.iter().map(|&i| mesh.positions[i as usize]);
+        at.all(|p| p.z == 1.0 && p.x.abs() < 0.5 && p.y.abs() < 0.5)
+    };
+    let middle = mesh.faces.iter().find(is_middle).unwrap().clone();
+    mesh.faces.retain(|face| face.iter().filter(|i| middle.contains(i)).count() != 2);
+    assert_eq!(mesh.faces.len(), 54 - 4);
+    let filled = repair(&mesh, &[Repair::FillHoles], None).unwrap();
+    assert_eq!(filled.done, ["Filled 4 holes."]);
+    let cage = Cage::new(&filled.mesh).unwrap();
+    assert_eq!(cage.notices(), []);
+    let volume: f64 = (0..cage.triangles().len() as u32)
+        .map(|t| cage.triangle_corners(t))
+        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+        .sum();
+    assert!((volume - 8.0).abs() < 1e-6, "{volume}");
+}
+
 #[test]
 fn split_seams_are_welded() {
     let whole = box_mesh(1);

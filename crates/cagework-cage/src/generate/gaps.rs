@@ -209,19 +209,26 @@ impl ModelGap {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// Returns a sentence with the gap's position and a remedy if the cage, made with `voxels` voxels along the longest
-    /// side, closes the gap; otherwise `None`.
-    pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
+    /// Returns a sentence with the gap's position and a remedy if the cage closes the gap; otherwise `None`. `[first,
+    /// voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was made.
+    pub(super) fn notice(
+        &self,
+        cage: &Cage,
+        [first, voxels]: [usize; 2],
+        options: &CageOptions,
+    ) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
         if 2 * inside <= self.points.len() {
             return None;
         }
-        let remedy = if voxels < self.voxels.min(MAX_VOXELS) {
-            format!("use {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
-        } else if self.voxels > MAX_VOXELS {
+        let is_coarse = voxels < self.voxels.min(MAX_VOXELS);
+        let remedy = if self.voxels > MAX_VOXELS && !is_coarse {
             "move its two sides apart: no lattice is fine enough".to_owned()
-        } else if 10 * cage.n_vertices() > 9 * options.target as usize {
+        } else if is_coarse && first < self.voxels.min(MAX_VOXELS) {
+            format!("use {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
+        } else if is_coarse || 10 * cage.n_vertices() > 9 * options.target as usize {
+            // If the first lattice was fine enough, its cage needed more vertices.
             format!("allow more than {} vertices", options.target)
         } else {
             format!("choose a smaller detail than {}", options.detail)

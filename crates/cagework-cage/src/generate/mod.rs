@@ -36,6 +36,7 @@ use glam::{DVec3, Vec3};
 use cagework_core::cage::Cage;
 use cagework_core::disjoint::DisjointSets;
 use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
+use cagework_core::words::{counted, grouped};
 use collapse::Collapser;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
@@ -83,6 +84,9 @@ const MAX_ROWS: f64 = 1.3e8;
 
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
+
+/// Smallest number of vertices of a closed part, a tetrahedron.
+const MIN_PART_VERTICES: usize = 4;
 
 /// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps. Collapsing that many
 /// takes about two seconds.
@@ -144,7 +148,16 @@ fn generate_plain(
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
-    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };
+    let apart = match (options.per_component, options.shape) {
+        (true, Shape::Follow) => {
+            let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), options, &go_on);
+            parts_apart(|n| Ok(shell(n)?.separate), [base, affordable], target)?
+        }
+        _ => Apart { parts: 1, voxels: MIN_VOXELS },
+    };
+    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest.max(apart.voxels) };
+    let least = apart.voxels.min(voxels);
+    let first = voxels;
     for attempt in 1..=MAX_LATTICES {
         let go_on = |stage: Stage, share: f32| {
             let fraction = (attempt as f32 - 1.0 + share) / attempt as f32;
@@ -156,11 +169,11 @@ fn generate_plain(
         })?;
         // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
         // lattice closes them.
-        let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
+        let may_coarsen = attempt < MAX_LATTICES && voxels > least;
         let n_half = shell.hull.positions.len();
         if options.voxels == 0 && voxels > base && may_coarsen && n_half > MAX_HULL {
             let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
-            voxels = (shrunk as usize).max(base);
+            voxels = (shrunk as usize).max(base).max(least);
             continue;
         }
         if gaps.len() <= most_gaps {
@@ -171,12 +184,20 @@ fn generate_plain(
             Simplification::Cage(cage, hull) => (*cage, hull),
             Simplification::TooMany(left) => {
                 let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
-                let least = if voxels > base { base } else { MIN_VOXELS };
-                voxels = ((ratio * voxels as f64) as usize).max(least);
+                let lowest = if voxels > base { base.max(least) } else { least };
+                voxels = ((ratio * voxels as f64) as usize).max(lowest);
                 continue;
             }
         };
-        let closed: Vec<String> = gaps.iter().filter_map(|gap| gap.notice(&cage, voxels, options)).collect();
+        let parts = n_parts(&cage);
+        let coarser = (options.voxels > 0 && voxels < first).then(|| {
+            format!(
+                "the lattice has {voxels} voxels instead of {first}, with which the cage needs more than {} vertices",
+                options.target
+            )
+        });
+        let closed = gaps.iter().filter_map(|gap| gap.notice(&cage, [first, voxels], options));
+        let notices = apart.notice(parts, options).into_iter().chain(coarser).chain(closed.take(MAX_NOTICES));
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
@@ -187,8 +208,8 @@ fn generate_plain(
             voxel_size: shell.lattice.cell as f32,
             clearance: shell.clearance as f32,
             mirror: shell.hull.mirror.map(Mirror::of_axis),
-            notices: closed.into_iter().take(MAX_NOTICES).collect(),
-            parts: n_parts(&cage),
+            notices: notices.collect(),
+            parts,
             separate: shell.separate as u32,
             hull_vertices: shell.hull.n_whole() as u32,
             hull,
@@ -198,6 +219,51 @@ fn generate_plain(
         return Ok(GeneratedCage { cage, report });
     }
     Err(CageGenError::Unresolved)
+}
+
+/// Components of a model that a cage can enclose one by one.
+struct Apart {
+    /// Number of components that the finest lattice keeps apart.
+    parts: usize,
+    /// Smallest number of voxels tried with which the hull has that many parts.
+    voxels: usize,
+}
+
+/// Finds the components of a model that a cage of `target` vertices can enclose one by one. `separate`: number of parts
+/// of the hull on a lattice. `[first, finest]`: voxels along the longest side of the coarsest and the finest lattice.
+///
+/// # Errors
+/// If `separate` is cancelled.
+fn parts_apart(
+    separate: impl Fn(usize) -> Result<usize, Cancellation>,
+    [first, finest]: [usize; 2],
+    target: usize,
+) -> Result<Apart, Cancellation> {
+    let parts = separate(finest)?;
+    if parts == 1 || parts * MIN_PART_VERTICES > target {
+        return Ok(Apart { parts, voxels: MIN_VOXELS });
+    }
+    let mut voxels = first;
+    while voxels < finest && separate(voxels)? < parts {
+        voxels = (voxels * 5 / 4).min(finest);
+    }
+    Ok(Apart { parts, voxels })
+}
+
+impl Apart {
+    /// Returns a sentence with a remedy if a cage with one part for each component has only `parts` parts.
+    fn notice(&self, parts: u32, options: &CageOptions) -> Option<String> {
+        if !options.per_component || parts as usize >= self.parts {
+            return None;
+        }
+        let remedy = if options.voxels > 0 && (options.voxels as usize) < self.voxels {
+            format!("use {} voxels instead of {}", self.voxels, options.voxels)
+        } else {
+            format!("allow more than {} vertices", options.target)
+        };
+        let has = counted(parts as usize, "closed part", "closed parts");
+        Some(format!("the cage has {has} for {} components; for one each, {remedy}", grouped(self.parts)))
+    }
 }
 
 /// Returns the initial number of voxels along the longest side. It grows with the target, as a cage of few vertices

@@ -340,6 +340,23 @@ fn separate_parts_get_one_cage_or_one_each() {
     assert_eq!(make(&soup, &each).report.parts, 3);
 }
 
+/// The cage of nine balls needs a finer lattice than its number of vertices alone, and must not fall back to a coarser one.
+/// For 25 balls, 80 vertices are too few.
+#[test]
+fn a_coarse_lattice_joins_no_components_unless_the_cage_has_too_few_vertices() {
+    let balls = |n: u32| {
+        let place = |k: u32| 3.0 * vec3((k % n) as f32, (k / n) as f32, 0.0);
+        join((0..n * n).map(|k| tube(&segment(place(k), place(k) + 0.1 * Vec3::Z), 1.0, false)))
+    };
+    let each = CageOptions { per_component: true, ..options(80) };
+    let nine = make(&balls(3), &each).report;
+    assert_eq!((nine.parts, nine.notices), (9, vec![]));
+    let many = make(&balls(5), &each).report;
+    assert!(many.parts < 25, "{}", many.parts);
+    let remedy = "for 25 components; for one each, allow more than 80 vertices";
+    assert!(many.notices[0].ends_with(remedy), "{:?}", many.notices);
+}
+
 #[test]
 fn hull_spans_the_gap_between_the_legs() {
     let hull = CageOptions { shape: Shape::Hull, ..options(16) };

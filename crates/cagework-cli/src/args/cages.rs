@@ -146,8 +146,9 @@ pub(crate) struct CheckArgs {
     pub(crate) grid: u32,
     /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and makes
     /// vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces
-    /// and unused vertices, mirror completes half a cage across its planar open boundary, fill-holes closes holes, flip
-    /// orients all faces outward, grow moves vertices outward until the cage encloses the model.
+    /// and unused vertices, mirror completes half a cage across an open boundary in a plane of constant x, y or z,
+    /// fill-holes closes holes, flip orients all faces outward, grow moves vertices outward until the cage encloses the
+    /// model.
     #[arg(long, value_parser = super::words::<Repair>(), value_delimiter = ',', value_name = "WHAT", requires = "output")]
     pub(crate) repair: Vec<Repair>,
     /// File for the repaired cage; the extension selects the format.

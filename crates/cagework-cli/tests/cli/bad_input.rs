@@ -224,5 +224,8 @@ fn box_cage_that_overflows_is_rejected_and_a_far_one_is_valid() {
     sandbox.write("far.obj", far + closed.split_at(closed.find('f').expect("a box has faces")).1);
     assert!(!sandbox.path("box.obj").exists());
     sandbox.run("cage far.obj --kind box --divisions 16 -o box.obj").success();
-    sandbox.run("check box.obj --mesh far.obj").success().stdout(contains("the whole model is inside"));
+    sandbox
+        .run("check box.obj --mesh far.obj")
+        .success()
+        .stdout(contains("all vertices of the model are inside"));
 }

@@ -24,7 +24,10 @@ fn every_kind_of_cage_can_be_bound() {
         let bound = sandbox.json(&format!("bind mesh.obj --cage {name} -g 16 --save-cage c.obj --json"));
         assert!(bound["cage_vertices"].as_u64().unwrap() <= at_most, "{name}: {}", bound["cage_vertices"]);
         assert_eq!(bound["outside_vertices"], 0, "{name}");
-        sandbox.run("check c.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+        sandbox
+            .run("check c.obj --mesh mesh.obj")
+            .success()
+            .stdout(contains("all vertices of the model are inside"));
     }
     for (name, message) in
         [("auto:5", "from 8 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]

@@ -35,7 +35,7 @@ fn smooth_cage_keeps_the_rest_pose_and_reports_outside_vertices() {
     sandbox
         .run("check made.obj --mesh mesh.obj --smooth 2")
         .success()
-        .stdout(contains("the whole model is inside"));
+        .stdout(contains("all vertices of the model are inside"));
     sandbox.run("bind mesh.obj --cage cage.obj --smooth 4").code(2).stderr(contains("from 0 to 3"));
 }
 

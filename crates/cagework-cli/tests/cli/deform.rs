@@ -195,7 +195,7 @@ fn files_with_z_up_keep_their_axes() {
     sandbox
         .run("check generated.obj --mesh mesh.obj")
         .success()
-        .stdout(contains("the whole model is inside"));
+        .stdout(contains("all vertices of the model are inside"));
 }
 
 #[test]
@@ -262,11 +262,17 @@ fn models_far_from_the_origin_are_deformed_with_the_same_accuracy() {
     assert_close(&obj_positions(&sandbox.read("fitted/mesh.obj")), &expected, 1e-5);
     // A generated cage has the model's origin too.
     sandbox.run("cage mesh.obj --kind box --divisions 1 -o box.obj").success();
-    sandbox.run("check box.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+    sandbox
+        .run("check box.obj --mesh mesh.obj")
+        .success()
+        .stdout(contains("all vertices of the model are inside"));
     let bounds = &sandbox.json("info box.obj --json")["bounds"];
     assert!((bounds["min"][2].as_f64().unwrap() - 4_499_999.8).abs() < 0.3, "{bounds}");
     sandbox.run("bind mesh.obj --cage auto:40 -g 16 --save-cage auto.obj").success();
-    sandbox.run("check auto.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+    sandbox
+        .run("check auto.obj --mesh mesh.obj")
+        .success()
+        .stdout(contains("all vertices of the model are inside"));
 }
 
 /// Each keyframe in a pose file is a pose. Commands that accept a single pose reject such a file.

@@ -341,6 +341,10 @@ fn outside_of(points: &[OutsidePoint], welded: &Weld, n_vertices: usize) -> (Vec
     (outside, n_held)
 }
 
+/// Smallest radius that a notice suggests instead of the current one, as a fraction of it. Below, the axis is on the
+/// cage.
+const MIN_RADIUS_SHARE: f64 = 1e-3;
+
 /// Returns notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side,
 /// balls and tubes that reach through the cage, and vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
@@ -356,9 +360,15 @@ fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     }
     if let (n @ 1.., Some(first)) = (controls.reaching().len(), controls.reaching().first()) {
         let [from, reach, them] = if n == 1 { ["", "reaches", "it"] } else { ["from ", "reach", "them"] };
+        let distance = controls.distance_of_reaching();
+        let smaller = if distance > MIN_RADIUS_SHARE * f64::from(radius) {
+            format!("use a radius below {distance:.3e}, or ")
+        } else {
+            String::new()
+        };
         notices.push(format!(
-            "{} inside ({from}element {first}) {reach} through the cage, whose surface keeps its own values there: use a \
-             radius below {radius:.3e}, or move {them} inwards.",
+            "{} inside ({from}element {first}) {reach} through the cage, whose surface keeps its own values there: \
+             {smaller}move {them} inwards.",
             counted(n, "ball or tube", "balls and tubes"),
         ));
     }

@@ -21,6 +21,9 @@ use crate::weights::Weights;
 /// Users draw sheets slightly beyond the cage, to leave no gap between the sheet and the cage.
 const MAX_PROTRUSION: f64 = 0.02;
 
+/// Number of intervals into which the axis of a tube is divided to measure its distance from the cage.
+const AXIS_SAMPLES: u32 = 32;
+
 /// Owned form of [`Controls`], with optional subdivision and inner controls.
 #[derive(Clone, Debug)]
 pub struct ControlSet {
@@ -108,6 +111,30 @@ impl ControlSet {
     #[must_use]
     pub fn reaching(&self) -> &[u32] {
         &self.reaching
+    }
+
+    /// Distance from the cage's surface to the centres and axes of the balls and tubes in [`Self::reaching`], object
+    /// units: with a smaller radius, none of them reaches through. Axes are sampled.
+    pub(crate) fn distance_of_reaching(&self) -> f64 {
+        let at = |i: u32| self.inner.positions[i as usize].as_dvec3();
+        let of_element = |&element: &u32| match &self.inner.elements[element as usize] {
+            InnerElement::Line(corners) => {
+                let along = |pair: &[u32]| {
+                    let [a, b] = [at(pair[0]), at(pair[1])];
+                    (0..=AXIS_SAMPLES).map(move |k| a.lerp(b, f64::from(k) / f64::from(AXIS_SAMPLES)))
+                };
+                corners.windows(2).flat_map(along).collect()
+            }
+            element => element.corners().iter().map(|&i| at(i)).collect::<Vec<_>>(),
+        };
+        let of_cage =
+            |facet: &u32| self.origins[self.surface.face_of_facet()[*facet as usize] as usize].is_some();
+        let facets: Vec<u32> = (0..self.surface.facets().len() as u32).filter(of_cage).collect();
+        let distance = |p: DVec3| {
+            let to = |&f: &u32| closest_point_on_triangle(p, self.surface.facet_corners(f)).point.distance(p);
+            facets.iter().map(to).fold(f64::INFINITY, f64::min)
+        };
+        self.reaching.iter().flat_map(of_element).map(distance).fold(f64::INFINITY, f64::min)
     }
 
     /// Computes the positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`,

@@ -26,6 +26,17 @@ const LINES_PER_FACE: f64 = 4.0;
 /// Number of lines that a face must meet before it is judged by its depth.
 const MIN_LINES: u32 = 8;
 
+/// Width of a polygon: the smallest distance between an edge's line and the vertex farthest from it. A face that is
+/// narrower than a cell can lie between two lines over its whole length.
+fn width(outline: &[DVec3]) -> f64 {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    let of_edge = |(&a, &b): (&DVec3, &DVec3)| {
+        let along = (b - a).normalize_or(DVec3::X);
+        outline.iter().map(|&p| (p - a).reject_from(along).length()).fold(0.0, f64::max)
+    };
+    edges.map(of_edge).fold(f64::INFINITY, f64::min)
+}
+
 /// Statistics of the lines that meet a face.
 #[derive(Clone, Default)]
 struct FaceLines {
@@ -60,7 +71,9 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
             let twice_area = (2..face.len())
                 .map(|k| (at(face[k - 1]) - at(face[0])).cross(at(face[k]) - at(face[0])))
                 .sum::<DVec3>();
-            finer = finer.max((LINES_PER_FACE / (0.5 * twice_area.length())).sqrt());
+            let outline: Vec<DVec3> = face.iter().map(|&i| at(i)).collect();
+            let of_area = (LINES_PER_FACE / (0.5 * twice_area.length())).sqrt();
+            finer = finer.max(of_area).max(1.0 / width(&outline));
         } else {
             face.iter().for_each(|&i| moves[i as usize] = true);
         }
@@ -111,7 +124,7 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
         1 => format!("; cage vertex {} moves little or nothing", still[0]),
         n => format!("; {n} cage vertices (from {} on) move little or nothing", still[0]),
     };
-    let wanted = (f64::from(cells) * finer).ceil();
+    let wanted = (f64::from(cells) * finer).ceil().max(f64::from(cells + 1));
     let advice = if wanted <= f64::from(MAX_GRID) {
         format!("use a grid of {wanted} cells")
     } else {

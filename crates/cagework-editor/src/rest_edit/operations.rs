@@ -197,7 +197,7 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<CageEdit, RestE
     let rim: Vec<[u32; 2]> =
         deleted.iter().flat_map(|&f| sides(f)).filter(|&[a, b]| !inner.contains(&[b, a])).collect();
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-    for outline in loops(&rim) {
+    for outline in loops(&rim, &at, &edited.mesh.faces) {
         let triangles = triangulate(&outline, &at, &edited.mesh.faces)
             .ok_or(RestEditError::LargeHole { edges: outline.len() })?;
         edited.touched.extend(&outline);
