@@ -114,11 +114,14 @@ fn area_normal(face: &[u32], at: &[DVec3]) -> DVec3 {
 /// one lies on the remaining faces.
 const FOLD_COST: f64 = 1.0;
 
+/// Smallest area of a triangle without corners in line, as a fraction of the square of its longest side.
+const MIN_AREA: f64 = 1e-6;
+
 /// Cosine of the angle between two faces above which they are folded onto each other (8 degrees).
 const MAX_FOLD_COSINE: f64 = 0.99;
 
-/// Computes a minimum-area triangulation of an outline, with the outline's orientation. It avoids folding onto the
-/// `faces` around the hole. `None` if the outline has too many corners.
+/// Computes a minimum-area triangulation of an outline, with the outline's orientation. It avoids triangles without area
+/// and folding onto the `faces` around the hole. `None` if the outline has too many corners.
 ///
 /// Source: Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
 pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
@@ -133,6 +136,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
         let across = (p(opposite) - from).reject_from((to - from).normalize_or(DVec3::X));
         f64::from(u8::from(across.normalize_or_zero().dot(behind[side]) > MAX_FOLD_COSINE))
     };
+    // Cost of a triangle without area, larger than the area of a triangulation without one.
+    let avoided = (0..n).map(|k| p(k).distance(p((k + 1) % n))).sum::<f64>().powi(2);
     let mut cost = vec![vec![0.0_f64; n]; n];
     let mut split = vec![vec![0; n]; n];
     for length in 2..n {
@@ -141,6 +146,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
             cost[i][k] = f64::INFINITY;
             for m in i + 1..k {
                 let area = (p(m) - p(i)).cross(p(k) - p(i)).length();
+                let longest = [(m, i), (k, i), (m, k)].map(|(a, b)| p(a).distance_squared(p(b))).into_iter();
+                let is_flat = area <= MIN_AREA * longest.fold(0.0, f64::max);
                 let mut folded = 0.0;
                 for (is_side, side, opposite) in
                     [(m == i + 1, i, k), (k == m + 1, m, i), (length == n - 1, n - 1, m)]
@@ -149,7 +156,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
                         folded += folds(side, opposite);
                     }
                 }
-                let total = cost[i][m] + cost[m][k] + area * (1.0 + FOLD_COST * folded);
+                let flat = if is_flat { avoided } else { 0.0 };
+                let total = cost[i][m] + cost[m][k] + area * (1.0 + FOLD_COST * folded) + flat;
                 if total < cost[i][k] {
                     cost[i][k] = total;
                     split[i][k] = m;

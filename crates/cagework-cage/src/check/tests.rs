@@ -81,6 +81,16 @@ fn holes_that_meet_in_corners_are_filled_one_by_one() {
     assert!((volume - 8.0).abs() < 1e-6, "{volume}");
 }
 
+/// Many triangulations of a flat hole have the same area. The corners in the middle of the sides lie in line with others.
+#[test]
+fn a_flat_hole_is_filled_without_triangles_in_line() {
+    let mut mesh = box_mesh(3);
+    let positions = &mesh.positions;
+    mesh.faces.retain(|face| face.iter().any(|&i| positions[i as usize].z < 1.0));
+    let filled = mended(&mesh, &[Repair::FillHoles]);
+    assert_eq!(codes(&filled), [Code::UnusedVertex], "only the vertices in the middle of the hole");
+}
+
 #[test]
 fn split_seams_are_welded() {
     let whole = box_mesh(1);

@@ -222,13 +222,13 @@ impl ModelGap {
         if 2 * inside <= self.points.len() {
             return None;
         }
-        let is_coarse = voxels < self.voxels.min(MAX_VOXELS);
-        let remedy = if self.voxels > MAX_VOXELS && !is_coarse {
+        let wanted = self.voxels.min(MAX_VOXELS);
+        let remedy = if voxels < wanted && voxels == first {
+            format!("use {wanted} voxels instead of {voxels}")
+        } else if voxels >= wanted && self.voxels > MAX_VOXELS {
             "move its two sides apart: no lattice is fine enough".to_owned()
-        } else if is_coarse && first < self.voxels.min(MAX_VOXELS) {
-            format!("use {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
-        } else if is_coarse || 10 * cage.n_vertices() > 9 * options.target as usize {
-            // If the first lattice was fine enough, its cage needed more vertices.
+        } else if voxels < wanted || 10 * cage.n_vertices() > 9 * options.target as usize {
+            // On a finer lattice, the cage needed too many vertices.
             format!("allow more than {} vertices", options.target)
         } else {
             format!("choose a smaller detail than {}", options.detail)
