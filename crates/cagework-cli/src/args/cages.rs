@@ -46,7 +46,8 @@ pub(crate) struct CageArgs {
     /// Make the cage symmetric: if the model is symmetric (auto), never (none), or always in the plane perpendicular to an axis (x, y, z).
     #[arg(long, default_value_t, value_parser = super::words::<Symmetry>())]
     pub(crate) symmetry: Symmetry,
-    /// One closed part per connected component of the model, without bridges between them.
+    /// One closed part per component of the model, without bridges between them. Components within a few voxels of each
+    /// other count as one.
     #[arg(long)]
     pub(crate) per_component: bool,
     #[arg(long, help = CLEARANCE.about(), default_value_t = CageOptions::default().clearance, value_name = "FRACTION", value_parser = super::number::<f32>(CLEARANCE))]
