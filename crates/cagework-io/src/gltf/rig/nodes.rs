@@ -36,7 +36,8 @@ const MIN_BONE_LENGTH: f64 = 1e-4;
 const MIN_HIP_HEIGHT: f64 = 0.1;
 /// Minimum number of enclosed vertices for fitting a rigid motion.
 const MIN_RIGID_VERTICES: usize = 3;
-/// Limits of the factor that scales the translations in clips of a skeleton.
+/// Limits of the factor that scales the translations in clips of a skeleton, relative to the change of the skeleton's
+/// size.
 const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
 /// The nodes of a document after the deformation.
@@ -372,8 +373,8 @@ impl Rig<'_> {
     /// feet would detach from legs.
     ///
     /// The factor is the height of the hips above the skeleton's lowest vertex after the deformation, divided by this
-    /// height before the deformation. The hips are the node above the floor that, together with its descendants,
-    /// carries the most vertices.
+    /// height before the deformation, within [`TRAVEL_SCALE_RANGE`]. The hips are the node above the floor that,
+    /// together with its descendants, carries the most vertices.
     fn ratios(&self, given: &Deformation<'_>, moves: &[NodeMove]) -> Vec<f64> {
         let (skeletons, n_skeletons) = self.skeletons();
         let mut carried = self.held.clone();
@@ -382,8 +383,8 @@ impl Rig<'_> {
                 carried[parent as usize] += carried[node as usize];
             }
         }
-        // Heights of the lowest and highest vertex at rest, and of the lowest vertex after the deformation.
-        let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY]; n_skeletons];
+        // Opposite corners of the box around the vertices of each skeleton, before and after the deformation.
+        let mut boxes = vec![[[DVec3::INFINITY, DVec3::NEG_INFINITY]; 2]; n_skeletons];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {
             let joint =
                 part.instance.skin.and_then(|skin| self.document.root.skins[skin as usize].joints.first());
@@ -391,21 +392,28 @@ impl Rig<'_> {
             let Some(skeleton) = holder.and_then(|node| skeletons[node]) else { continue };
             let motion = part.instance.node.and_then(|node| given.rigid.get(&node));
             for (at, by) in part.rest().into_iter().zip(&given.by[part.first..]) {
-                let (height, by) = (at.dot(given.up), motion.map_or(*by, |motion| motion.by(at)));
-                let [low, high, after] = &mut spans[skeleton];
-                (*low, *high) = (low.min(height), high.max(height));
-                *after = after.min(height + by.dot(given.up));
+                let by = motion.map_or(*by, |motion| motion.by(at));
+                for ([low, high], at) in boxes[skeleton].iter_mut().zip([at, at + by]) {
+                    (*low, *high) = (low.min(at), high.max(at));
+                }
             }
         }
         let mut hips = vec![(0.0, 1.0); n_skeletons];
         for &(node, _) in &self.follows {
             let i = node as usize;
             let Some(skeleton) = skeletons[i] else { continue };
-            let ([low, high, after], at) = (spans[skeleton], self.worlds.world[i].w_axis.truncate());
+            let at = self.worlds.world[i].w_axis.truncate();
+            let heights = |corners: [DVec3; 2]| {
+                let [a, b] = corners.map(|corner| corner.dot(given.up));
+                [a.min(b), a.max(b)]
+            };
+            let [[low, high], [after, _]] = boxes[skeleton].map(heights);
             let (before, now) = (at.dot(given.up) - low, (at + moves[i].by).dot(given.up) - after);
             if carried[i] > hips[skeleton].0 && before > MIN_HIP_HEIGHT * (high - low) {
-                hips[skeleton] =
-                    (carried[i], (now / before).clamp(TRAVEL_SCALE_RANGE.0, TRAVEL_SCALE_RANGE.1));
+                let [size, size_now] = boxes[skeleton].map(|[low, high]| low.distance(high));
+                let change = Some(size_now / size).filter(|change| change.is_finite()).unwrap_or(1.0);
+                let (least, most) = TRAVEL_SCALE_RANGE;
+                hips[skeleton] = (carried[i], (now / before).clamp(least * change, most * change));
             }
         }
         skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()

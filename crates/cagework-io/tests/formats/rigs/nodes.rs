@@ -244,3 +244,18 @@ fn travel_of_a_root_that_stays_scales_with_the_skeleton() {
         assert!(before.z > 0.4 && after.distance(1.35 * before) < ROUNDING_TOLERANCE, "{before} {after}");
     }
 }
+
+/// A uniform scale s takes each place of each clip to s times that place.
+#[test]
+fn travel_of_clips_has_the_unit_of_the_model() {
+    let model = read(&robot().glb());
+    for scale in [0.01, 100.0] {
+        let after = player(&read(&moved_by(&model, Joints::Follow, |p| scale * p)));
+        for (clip, seconds) in [(0, 0.5), (0, 1.0), (1, 0.0)] {
+            let before = player(&model).at(Some(clip), seconds, &[]).origins;
+            let expected: Vec<Vec3> = before.iter().map(|&p| scale * p).collect();
+            let found = &after.at(Some(clip), seconds, &[]).origins;
+            assert_near(found, &expected, scale * ROUNDING_TOLERANCE, &format!("scale {scale}, clip {clip}"));
+        }
+    }
+}
