@@ -227,8 +227,9 @@ impl Binder<'_> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
         let (path, format) = (&job.model, job.output.format);
-        let has_moves = self.skeleton.as_ref().is_some_and(|skeleton| skeleton.has_moves());
-        let load = if has_moves && format == ModelFormat::Gltf { load_with_clips } else { load_model };
+        // Joints of files of clips without a mesh take their moves from the body.
+        let can_be_clips = args.skeleton.is_some() && format == ModelFormat::Gltf;
+        let load = if can_be_clips { load_with_clips } else { load_model };
         let mut model = load(path, args.read.axis(), args.read.memory)?;
         model.set_origin(self.origin);
         if model.positions.is_empty() {

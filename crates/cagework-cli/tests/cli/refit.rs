@@ -289,6 +289,12 @@ fn clips_without_a_mesh_follow_the_body() {
     };
     sandbox.write("walk.glb", clips("mixamorig:"));
     sandbox.write("other.glb", clips("x"));
+    let nameless = edited(&body, |json, _| {
+        for node in json["nodes"].as_array_mut().unwrap() {
+            node.as_object_mut().unwrap().remove("name");
+        }
+    });
+    sandbox.write("nameless.glb", nameless);
     let refit = "refit walk.glb --cage cage.obj --pose wide.obj -g 24 -o out";
     sandbox.run(refit).code(1).stderr(contains("walk.glb: it has clips, but no triangles"));
     let done = sandbox.json(&format!("{refit} --skeleton humanoid.glb --json"));
@@ -303,6 +309,7 @@ fn clips_without_a_mesh_follow_the_body() {
     }
     for (args, message) in [
         ("other.glb --skeleton humanoid.glb", "none of its nodes has the name of a joint of the skeleton"),
+        ("walk.glb --skeleton nameless.glb", "none of its nodes has the name of a joint of the skeleton"),
         ("walk.glb --skeleton cage.obj", "cage.obj: has no skeleton"),
         ("walk.glb --skeleton missing.glb", "missing.glb: there is no such file"),
     ] {

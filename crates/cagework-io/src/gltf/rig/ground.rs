@@ -34,6 +34,14 @@ impl Ground {
         Self { clips, ..self }
     }
 
+    /// The ground in another unit, in which all heights are `by` times as large.
+    pub(super) fn scaled(&self, by: f64) -> Self {
+        let scaled = |lows: [f64; 2]| lows.map(|low| by * low);
+        let clip =
+            |clip: &ClipGround| ClipGround { lows: scaled(clip.lows), lift: by * clip.lift, ..clip.clone() };
+        Self { rest: self.rest.map(scaled), clips: self.clips.iter().map(clip).collect() }
+    }
+
     /// Height by which the models are lifted.
     pub(crate) fn lift(&self) -> f64 {
         self.rest.map_or(0.0, |[before, after]| before - after)

@@ -79,6 +79,8 @@ pub(super) struct NamedMoves {
 /// The deformation that [`Rig::moved`] applies to the nodes.
 pub(super) struct Deformation<'a> {
     pub(super) by: &'a [DVec3],
+    /// Size of this document's skeleton as a multiple of that of the shared skeleton.
+    pub(super) scale: f64,
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,

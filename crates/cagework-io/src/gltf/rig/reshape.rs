@@ -75,8 +75,12 @@ pub(crate) fn reshape(
     let mut by = by;
     let own = options.ground.then(|| rig.ground(by, up));
     let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground.as_ref());
-    let lift = shared.or(own.as_ref()).map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
+    let shared = shared.map(|ground| ground.scaled(unit));
+    let lift = shared.as_ref().or(own.as_ref()).map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
+    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     if lift != DVec3::ZERO {
+    // Vertices are in the unit of the cage. A file without vertices can be in another unit than the body.
+    let unit = named.as_ref().filter(|_| rig.parts.is_empty()).map_or(1.0, |named| named.scale);
         grounded = by.iter().map(|&by| by + lift).collect::<Vec<_>>();
         by = &grounded;
     }
@@ -91,7 +95,6 @@ pub(crate) fn reshape(
         }
         rigid.extend(found);
     }
-    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     let mut report = ReshapeReport {
         joints: rig.following(named.as_ref()).into_iter().filter(|follows| *follows).count(),
         morph_ends: rig.n_ends,
@@ -162,7 +165,7 @@ pub(crate) fn reshape(
     report.lift = lift.dot(up);
     report.ground = own;
     if options.ground && has_moved && options.joints != Joints::Stay {
-        let lows = lift::LiftInput { named: named.as_ref(), shared, lift: report.lift, up };
+        let lows = lift::LiftInput { named: named.as_ref(), shared: shared.as_ref(), lift: report.lift, up };
         let (lifted, clips) = lift::lift_clips(rig, glb, &lows)?;
         glb = lifted;
         report.clip_lifts = clips.iter().map(|clip| clip.lift).collect();

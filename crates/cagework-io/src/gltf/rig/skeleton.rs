@@ -12,7 +12,7 @@ use super::ground::Ground;
 use super::nodes::{Deformation, NamedMoves, NodeMove, holders};
 use crate::gltf::GltfDocument;
 use crate::gltf::geometry::attribute;
-use crate::gltf::scene::{Worlds, name_of};
+use crate::gltf::scene::Worlds;
 use crate::gltf::skin::each_influence;
 
 /// Two skeletons are equally large if the ratio of their sizes differs from 1 by at most this.
@@ -26,7 +26,7 @@ const MAX_SAME_BONE: f64 = 0.17;
 
 /// Displacements of joints by their names, for files that share a rig.
 ///
-/// Names are compared without a namespace (`mixamorig:Hips` and `Hips` are equal).
+/// Names are compared without a namespace (`mixamorig:Hips` and `Hips` are equal). Nodes without a name are left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Skeleton {
     /// Joints that carry vertices in one of the files.
@@ -51,12 +51,6 @@ struct BodyJoint {
 }
 
 impl Skeleton {
-    /// Whether the skeleton contains displacements of joints. Files without triangles need them.
-    #[must_use]
-    pub fn has_moves(&self) -> bool {
-        !self.moves.is_empty()
-    }
-
     /// Lowest points that determine how far every file is lifted.
     #[must_use]
     pub fn ground(&self) -> Option<&Ground> {
@@ -73,10 +67,6 @@ impl Skeleton {
     pub fn add(&mut self, other: Self) {
         self.holds.extend(other.holds);
     }
-
-    pub(super) fn holds(&self, name: &str) -> bool {
-        self.holds.contains(bare(name))
-    }
 }
 
 /// Name without a namespace. Some programs remove the colon from `mixamorig:Hips`, so the prefix `mixamorig` is removed,
@@ -84,6 +74,11 @@ impl Skeleton {
 pub(super) fn bare(name: &str) -> &str {
     let name = name.rsplit(':').next().unwrap_or(name);
     name.strip_prefix("mixamorig").filter(|rest| !rest.is_empty()).unwrap_or(name)
+}
+
+/// Name of a node without its namespace; `None` if the node has no name.
+fn bare_name(document: &GltfDocument, node: usize) -> Option<&str> {
+    document.json["nodes"][node]["name"].as_str().map(bare).filter(|name| !name.is_empty())
 }
 
 /// The joints that carry vertices. Skins that cannot be read contribute none.
@@ -101,8 +96,8 @@ pub(crate) fn joints_with_vertices(document: &GltfDocument) -> Skeleton {
             });
         }
         let holding = skin.joints.iter().zip(holds).filter(|(_, holds)| *holds);
-        let name = |joint: usize| name_of(&document.json, "nodes", joint as u32, "node");
-        skeleton.holds.extend(holding.map(|(joint, _)| bare(&name(joint.value())).to_owned()));
+        let names = holding.filter_map(|(joint, _)| bare_name(document, joint.value()));
+        skeleton.holds.extend(names.map(str::to_owned));
     }
     skeleton
 }
@@ -116,17 +111,20 @@ impl Rig<'_> {
         json: &mut Value,
     ) -> Skeleton {
         let moved = self.moved(given, json);
-        let above = nearest(&self.worlds, &self.following(None));
+        let name = |node: usize| bare_name(self.document, node);
+        let follows = self.following(None).into_iter().enumerate();
+        let is_joint: Vec<bool> = follows.map(|(node, follows)| follows && name(node).is_some()).collect();
+        let above = nearest(&self.worlds, &is_joint);
         let mut skeleton = Skeleton { ground, ..joints_with_vertices(self.document) };
         // Of several nodes with the same name, the first one defines the moves: list joints first.
         let follows = self.follows.iter().map(|&(node, _)| node as usize);
         for node in holders(self.document).into_iter().chain(follows) {
             let world = self.worlds.world[node];
-            let name = |node: usize| bare(&self.node_name(node as u32)).to_owned();
-            skeleton.moves.entry(name(node)).or_insert_with(|| BodyJoint {
+            let Some(own) = name(node) else { continue };
+            skeleton.moves.entry(own.to_owned()).or_insert_with(|| BodyJoint {
                 at: world.w_axis.truncate(),
                 linear: DMat3::from_mat4(world),
-                parent: above[node].map(name),
+                parent: above[node].and_then(name).map(str::to_owned),
                 moves: moved.moves[node],
             });
         }
@@ -139,24 +137,25 @@ impl Rig<'_> {
     /// A file of clips can have another rest pose than the body. A joint then moves relative to the joint above as in
     /// the body, but in the frame of that joint at rest, so that its bone gets the length of the body's bone.
     pub(super) fn named(&self, skeleton: &Skeleton) -> NamedMoves {
-        let names: Vec<String> =
-            (0..self.held.len() as u32).map(|node| bare(&self.node_name(node)).to_owned()).collect();
+        let n = self.held.len();
+        let names: Vec<Option<&str>> = (0..n).map(|node| bare_name(self.document, node)).collect();
+        let joint = |node: usize| skeleton.moves.get(names[node]?);
         let mut found: BTreeMap<&str, usize> = BTreeMap::new();
         let follows = self.follows.iter().map(|&(node, _)| node as usize);
         // A joint of the body that no clip of this file moves can still be the parent of one that a clip moves.
-        let others = (0..names.len()).filter(|&node| self.document.root.nodes[node].skin.is_none());
+        let others = (0..n).filter(|&node| self.document.root.nodes[node].skin.is_none());
         for node in holders(self.document).into_iter().chain(follows).chain(others) {
-            if skeleton.moves.contains_key(&names[node]) {
-                found.entry(&names[node]).or_insert(node);
+            if let Some(name) = names[node].filter(|&name| skeleton.moves.contains_key(name)) {
+                found.entry(name).or_insert(node);
             }
         }
-        let mut is_found = vec![false; names.len()];
+        let mut is_found = vec![false; n];
         found.values().for_each(|&node| is_found[node] = true);
         let above = nearest(&self.worlds, &is_found);
         // The joint above each joint that has the same name in both files.
         let parent = |node: usize| {
-            let body = skeleton.moves.get(&names[node])?;
-            above[node].filter(|&above| body.parent.as_deref() == Some(names[above].as_str()))
+            let body = joint(node)?;
+            above[node].filter(|&above| body.parent.as_deref() == names[above])
         };
         let own = |node: usize| self.worlds.world[node].w_axis.truncate();
         let size = |points: &[DVec3]| {
@@ -166,8 +165,8 @@ impl Rig<'_> {
         };
         // The median ratio of bones does not depend on the rest poses. Without bones, the boxes of the joints are compared.
         let of_bone = |&node: &usize| {
-            let (above, body) = (parent(node)?, |node: usize| skeleton.moves[&names[node]].at);
-            let [mine, others] = [own(node).distance(own(above)), body(node).distance(body(above))];
+            let above = parent(node)?;
+            let [mine, others] = [own(node).distance(own(above)), joint(node)?.at.distance(joint(above)?.at)];
             (mine > 0.0 && others > 0.0).then_some(mine / others)
         };
         let mut bones: Vec<f64> = found.values().filter_map(of_bone).collect();
@@ -179,66 +178,63 @@ impl Rig<'_> {
         let scale = Some(bones.get(bones.len() / 2).copied().unwrap_or_else(of_boxes))
             .filter(|scale| scale.is_finite() && *scale > 0.0 && (scale - 1.0).abs() > MAX_SAME_SCALE)
             .unwrap_or(1.0);
-        let mut of_nodes = vec![None; names.len()];
-        let turned = self.frame_changes(&names, skeleton, &is_found, parent);
+        let mut of_nodes: Vec<Option<NodeMove>> = vec![None; n];
+        let bodies: Vec<Option<&BodyJoint>> =
+            (0..n).map(|node| joint(node).filter(|_| is_found[node])).collect();
+        let turned = self.frame_changes(&bodies, parent);
         // Whether the move of each node is that of the body, without a change by the rest pose.
-        let mut is_plain = vec![true; names.len()];
-        for node in self.worlds.order.iter().map(|&(node, _)| node as usize).filter(|&node| is_found[node]) {
-            let body = &skeleton.moves[&names[node]];
+        let mut is_plain = vec![true; n];
+        for node in self.worlds.order.iter().map(|&(node, _)| node as usize) {
+            let Some(body) = bodies[node] else { continue };
             let mut own = NodeMove { by: scale * body.moves.by, ..body.moves };
             if let Some(turn) = turned[node] {
                 own.turn = turn * own.turn * turn.transpose();
             }
             if let Some(above) = parent(node)
-                && let Some(NodeMove { by, .. }) = of_nodes[above]
+                && let (Some(NodeMove { by, .. }), Some(body_above)) = (of_nodes[above], bodies[above])
             {
                 is_plain[node] = is_plain[above] && turned[above].is_none();
                 if !is_plain[node] {
-                    let relative = body.moves.by - skeleton.moves[&names[above]].moves.by;
+                    let relative = body.moves.by - body_above.moves.by;
                     own.by = by + scale * (turned[above].unwrap_or(DMat3::IDENTITY) * relative);
                 }
             }
             of_nodes[node] = Some(own);
         }
-        let holds = names.iter().map(|name| skeleton.holds(name)).collect();
-        NamedMoves { of_nodes, holds }
+        let holds = names.iter().map(|name| name.is_some_and(|name| skeleton.holds.contains(name))).collect();
+        NamedMoves { of_nodes, holds, scale }
     }
 
     /// Rotation of each joint at rest from the body to this document; `None` if it has the same frame in both. Programs
     /// give bones different axes, so a rotation counts only if it takes the bones below the joint from the body to this
-    /// document. `parent`: the joint above a joint, if it has the same name in both files.
+    /// document. `bodies`: for each node, the joint of the body with its name. `parent`: the joint above a joint, if it
+    /// has the same name in both files.
     fn frame_changes(
         &self,
-        names: &[String],
-        skeleton: &Skeleton,
-        is_found: &[bool],
+        bodies: &[Option<&BodyJoint>],
         parent: impl Fn(usize) -> Option<usize>,
     ) -> Vec<Option<DMat3>> {
         let world = |node: usize| self.worlds.world[node];
-        let body = |node: usize| &skeleton.moves[&names[node]];
-        let change = |node: usize| {
-            is_found[node].then(|| frame_change(DMat3::from_mat4(world(node)), body(node).linear)).flatten()
+        let change = |(node, body): (usize, &Option<&BodyJoint>)| {
+            frame_change(DMat3::from_mat4(world(node)), body.as_ref()?.linear)
         };
-        let mut changes: Vec<Option<DMat3>> = (0..names.len()).map(change).collect();
-        let (mut has_bone, mut fits) = (vec![false; names.len()], vec![true; names.len()]);
-        for node in (0..names.len()).filter(|&node| is_found[node]) {
-            let Some(above) = parent(node) else { continue };
+        let mut changes: Vec<Option<DMat3>> = bodies.iter().enumerate().map(change).collect();
+        let (mut has_bone, mut fits) = (vec![false; bodies.len()], vec![true; bodies.len()]);
+        for (node, body) in bodies.iter().enumerate() {
+            let (Some(body), Some(above)) = (body, parent(node)) else { continue };
+            let Some(body_above) = bodies[above] else { continue };
             let own = (world(node).w_axis - world(above).w_axis).truncate().normalize_or_zero();
-            let of_body = (body(node).at - body(above).at).normalize_or_zero();
+            let of_body = (body.at - body_above.at).normalize_or_zero();
             has_bone[above] = true;
             fits[above] &= own.distance(changes[above].unwrap_or(DMat3::IDENTITY) * of_body) <= MAX_SAME_BONE;
         }
-        for node in self.worlds.order.iter().map(|&(node, _)| node as usize).filter(|&node| is_found[node]) {
-            if !has_bone[node] {
+        for node in self.worlds.order.iter().map(|&(node, _)| node as usize) {
+            if bodies[node].is_some() && !has_bone[node] {
                 fits[node] = parent(node).is_none_or(|above| fits[above]);
             }
         }
         changes.iter_mut().zip(fits).filter(|(_, fits)| !fits).for_each(|(change, _)| *change = None);
         changes
-    }
-
-    fn node_name(&self, node: u32) -> String {
-        name_of(&self.document.json, "nodes", node, "node")
     }
 }
 

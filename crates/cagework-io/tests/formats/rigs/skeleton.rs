@@ -174,3 +174,57 @@ fn joints_turn_as_in_the_body() {
         assert_near(&after, &body, TURN_TOLERANCE, "first key, which is the rest pose");
     }
 }
+
+/// The body is 100 times as large as the file of clips, so all places in clips are 100 times as far from the origin.
+#[test]
+fn lifts_have_the_unit_of_the_file_of_clips() {
+    // The clip holds the root above the ground.
+    let mut rig = rigged();
+    let raised = rig.accessor(&common::floats(&[0.0, 0.5, 0.0, 0.0, 0.6, 0.6]), common::F32, 2, "VEC3");
+    rig.json["animations"][0]["samplers"][0]["output"] = raised.into();
+    let body = read(&rig.glb());
+    let file = rig.json.as_object_mut().unwrap();
+    ["meshes", "skins"].into_iter().for_each(|key| drop(file.shift_remove(key)));
+    rig.json["nodes"][4] = json!({ "name": "bar" });
+    rig.json["animations"][0]["channels"].as_array_mut().unwrap().truncate(3);
+    rig.json["nodes"][0]["scale"] = json!([0.02, 0.02, 0.02]);
+    let read_clips =
+        |bytes: Vec<u8>| Model::read_with_clips("a.glb", &bytes, &mut |_| None, u64::MAX).unwrap();
+    let clips = read_clips(rig.glb());
+    let mut options = ReshapeOptions { ground: true, ..ReshapeOptions::default() };
+    let (of_body, report) = body.write_reshaped(&by(&body), &[], &[], &options).unwrap();
+    assert!(report.lift < -0.01 && report.clip_lifts[0] < -0.1, "{report:?}");
+    options.skeleton = Some(Arc::new(body.skeleton(&by(&body), &[], &options).unwrap()));
+    let still = vec![DVec3::ZERO; clips.extra_points().unwrap().len()];
+    let (of_clips, of_report) = clips.write_reshaped(&still, &[], &[], &options).unwrap();
+    assert!((100.0 * of_report.lift - report.lift).abs() < 1e-6, "{of_report:?}");
+    for seconds in [0.0, 0.3, 1.0] {
+        let places = |model: &Model, scale: f32| -> Vec<Vec3> {
+            let origins = player(model).at(Some(0), seconds, &[]).origins;
+            origins[1..4].iter().map(|&p| scale * p).collect()
+        };
+        let (found, expected) = (places(&read_clips(of_clips.clone()), 100.0), places(&read(&of_body), 1.0));
+        assert_near(&found, &expected, 5.0 * ROUNDING_TOLERANCE, &format!("{seconds} s"));
+    }
+}
+
+#[test]
+fn nodes_without_a_name_do_not_match() {
+    let nameless = |mut rig: common::Builder| {
+        for node in rig.json["nodes"].as_array_mut().unwrap() {
+            node.as_object_mut().unwrap().shift_remove("name");
+        }
+        rig
+    };
+    let body = read(&nameless(rigged()).glb());
+    let mut rig = nameless(rigged());
+    let file = rig.json.as_object_mut().unwrap();
+    ["meshes", "skins"].into_iter().for_each(|key| drop(file.shift_remove(key)));
+    rig.json["nodes"][4] = json!({});
+    let clips = Model::read_with_clips("walk.glb", rig.glb(), &mut |_| None, u64::MAX).unwrap();
+    let mut options = ReshapeOptions::default();
+    options.skeleton = Some(Arc::new(body.skeleton(&by(&body), &[], &options).unwrap()));
+    let still = vec![DVec3::ZERO; clips.extra_points().unwrap().len()];
+    let error = clips.write_reshaped(&still, &[], &[], &options).map(drop).unwrap_err().to_string();
+    assert!(error.contains("none of its nodes has the name of a joint of the skeleton"), "{error}");
+}
