@@ -6,8 +6,8 @@ use cagework_core::mesh::weld;
 
 use crate::origin::{origin_near, relative};
 
-/// Gradients whose determinant does not exceed this value, because they are singular or mirror, are replaced by the
-/// identity. The value is also the diagonal term that regularises the least squares.
+/// Gradients without the mean stretch whose determinant does not exceed this value, because they are singular or mirror,
+/// are replaced by the identity. The value is also the diagonal term that regularises the least squares.
 const MIN_DETERMINANT: f64 = 1e-9;
 
 /// Weights of the pair of normals relative to all edges at a vertex, in the order in which they are tried. At a flat
@@ -63,8 +63,9 @@ impl Surface {
     }
 
     /// Computes the gradient of the map from `from` to `to` at each vertex: least squares over the edges at the vertex,
-    /// and, with a small weight, over the unit normals before and after as one more pair of vectors. `None` if no adjacent
-    /// triangle has moved. `[n]`
+    /// and, with a small weight, over the normals before and after as one more pair of vectors. The ratio of their lengths
+    /// is the mean stretch of the surface, the square root of the ratio of the areas around the vertex. `None` if no
+    /// adjacent triangle has moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
@@ -96,6 +97,7 @@ impl Surface {
         others: &[Option<DMat3>],
     ) -> Vec<Option<DMat3>> {
         let mut normals = vec![[DVec3::ZERO; 2]; self.n_unique];
+        let mut sizes = vec![[0.0_f64; 2]; self.n_unique];
         let mut sums = vec![(DMat3::ZERO, DMat3::ZERO, 0.0_f64); self.n_unique];
         let mut moved = vec![false; self.n_unique];
         for triangle in &self.triangles {
@@ -109,8 +111,9 @@ impl Surface {
             for k in 0..3 {
                 let unique = self.unique_of[corners[k]] as usize;
                 moved[unique] |= has_moved;
-                for (normal, area) in normals[unique].iter_mut().zip(areas) {
-                    *normal += area;
+                for (k, area) in areas.into_iter().enumerate() {
+                    normals[unique][k] += area;
+                    sizes[unique][k] += area.length();
                 }
                 let (both, one, length) = &mut sums[unique];
                 for other in [(k + 1) % 3, (k + 2) % 3] {
@@ -128,14 +131,17 @@ impl Surface {
                 }
                 let (both, one, length) = sums[v];
                 let [n, m] = normals[v].map(DVec3::normalize_or_zero);
+                let stretch = (sizes[v][1] / sizes[v][0]).sqrt();
+                let stretch = if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 };
                 let scale = 1.0 / length.max(1e-30);
                 let one = scale * one + DMat3::from_diagonal(DVec3::splat(MIN_DETERMINANT));
+                // The gradient without the mean stretch, so that the threshold holds for all scales.
                 let with = |weight: f64| {
-                    (scale * both + weight * outer(m, n)) * (one + weight * outer(n, n)).inverse()
+                    (scale / stretch * both + weight * outer(m, n)) * (one + weight * outer(n, n)).inverse()
                 };
                 let mut tried = NORMAL_WEIGHTS.into_iter().map(with);
                 let found = tried.find(|gradient| gradient.determinant() > MIN_DETERMINANT);
-                moved[v].then_some(found.unwrap_or(DMat3::IDENTITY))
+                moved[v].then_some(stretch * found.unwrap_or(DMat3::IDENTITY))
             })
             .collect();
         let of = |(v, &unique): (usize, &u32)| {

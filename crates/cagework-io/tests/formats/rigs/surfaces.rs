@@ -196,3 +196,36 @@ fn dome_bent_into_a_bowl_has_the_normals_of_the_bowl() {
         assert!(angle < 3.0, "at {p}: {angle} degrees");
     }
 }
+
+/// Normals and tangents that are oblique to a flat sheet, such as those of hair and foliage, turn with a uniform scale and
+/// a rotation.
+#[test]
+fn oblique_normals_keep_their_angle_to_a_scaled_surface() {
+    let (at, _, triangles) = sheet(|_| [0.0; 2], 0, N);
+    let normals = vec![vec3(1.0, 0.0, 1.0).normalize(); at.len()];
+    let tangents = vec![vec3(0.6, 0.0, -0.8); at.len()];
+    let mut rig = Builder::new();
+    let list = |all: &[Vec3]| all.iter().map(Vec3::to_array).collect::<Vec<_>>();
+    let of_tangents: Vec<f32> = tangents.iter().flat_map(|t: &Vec3| [t.x, t.y, t.z, 1.0]).collect();
+    let of_tangents = rig.accessor(&floats(&of_tangents), F32, at.len(), "VEC4");
+    let attributes = json!({
+        "POSITION": rig.vec3(&list(&at)), "NORMAL": rig.vec3(&list(&normals)), "TANGENT": of_tangents,
+    });
+    let indices = rig.indices(triangles.as_flattened());
+    rig.push("meshes", json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }));
+    rig.json["nodes"] = json!([{ "mesh": 0, "translation": [1.0, 2.0, 3.0] }]);
+    let model = read(&rig.glb());
+    let points = [model.positions.clone(), model.extra_points().unwrap()].concat();
+    let turn = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(0.7);
+    for scale in [0.01, 0.5, 2.0, 100.0] {
+        let by: Vec<_> =
+            points.iter().map(|&p| (scale * turn).as_dmat3() * p.as_dvec3() - p.as_dvec3()).collect();
+        let (bytes, _) = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap();
+        for (name, width, before) in [("NORMAL", 3, &normals), ("TANGENT", 4, &tangents)] {
+            for (found, &before) in attribute(&bytes, name, width).iter().zip(before) {
+                let angle = found.angle_between(turn * before).to_degrees();
+                assert!(angle < 0.1, "{name} at scale {scale}: {found}, {angle} degrees");
+            }
+        }
+    }
+}
