@@ -356,12 +356,14 @@ impl<'a> Rig<'a> {
     }
 
     /// Adds the nodes that follow the cage: joints, animated nodes, VRM bones, nodes with unskinned meshes and a pivot,
-    /// and the descendants of these. Excludes nodes with skinned meshes, whose transform has no effect.
+    /// and the descendants of these. Excludes descendants with skinned meshes, because the transform of such a node has
+    /// no effect on its mesh.
     fn add_nodes(&mut self) {
         let nodes = &self.document.root.nodes;
         for node in nodes::holders(self.document) {
             self.on_skeleton[node] = true;
         }
+        let is_holder = self.on_skeleton.clone();
         self.worlds.mark_below(&mut self.on_skeleton);
         let mut below = self.on_skeleton.clone();
         for ((below, node), world) in below.iter_mut().zip(nodes).zip(&self.worlds.world) {
@@ -369,7 +371,7 @@ impl<'a> Rig<'a> {
         }
         self.worlds.mark_below(&mut below);
         for (node, _) in self.worlds.order.clone() {
-            if below[node as usize] && nodes[node as usize].skin.is_none() {
+            if below[node as usize] && (nodes[node as usize].skin.is_none() || is_holder[node as usize]) {
                 self.follows.push((node, self.n_vertices + self.extras.len()));
                 self.anchor(self.worlds.world[node as usize].w_axis.truncate());
             }

@@ -259,3 +259,33 @@ fn travel_of_clips_has_the_unit_of_the_model() {
         }
     }
 }
+
+/// A node that shows a skinned mesh carries a prop. Under a uniform scale s, a clip that moves the node takes the prop
+/// to s times its places.
+#[test]
+fn animated_nodes_with_skinned_meshes_follow_the_cage() {
+    let mut rig = rigged();
+    let mesh = centred_cube(&mut rig);
+    rig.push("nodes", json!({ "name": "prop", "mesh": mesh, "translation": [0.0, -1.0, 0.0] }));
+    rig.json["nodes"][4]["children"] = json!([5]);
+    clip(&mut rig, &[(4, "translation", vec![7.0, 7.0, 7.0, 7.0, 7.5, 9.0])]);
+    let model = read(&rig.glb());
+    let after = player(&read(&moved_by(&model, Joints::Follow, |p| 1.6 * p)));
+    for seconds in [0.0, 0.6, 1.0] {
+        let before = shown(&player(&model), Some(1), seconds, &[]);
+        let expected: Vec<Vec3> = before.iter().map(|&p| 1.6 * p).collect();
+        assert_near(&shown(&after, Some(1), seconds, &[]), &expected, 1e-5, &format!("{seconds} s"));
+    }
+}
+
+#[test]
+fn joints_that_show_skinned_meshes_follow_the_cage() {
+    let mut rig = rigged();
+    rig.json["skins"][0]["joints"] = json!([1, 2, 4]);
+    let model = read(&rig.glb());
+    let bytes = reshaped(&model, Joints::Follow).0;
+    let [found, expected] = [translation(&json_of(&bytes), 4), f(Vec3::splat(7.0))];
+    assert!(found.distance(expected) <= 1e-5, "{found} instead of {expected}");
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    assert_near(&read(&bytes).positions, &moved, 2e-5, "at rest");
+}
