@@ -13,7 +13,7 @@ use super::tracks::NodeChange;
 use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
 use crate::gltf::channels::{ChannelTarget, channel_target};
-use crate::gltf::scene::{Worlds, local, name_of};
+use crate::gltf::scene::{local, name_of};
 
 cagework_core::choice! {
     /// How the skeleton follows the cage.
@@ -34,6 +34,8 @@ const MIN_DISPLACEMENT: f64 = 1e-6;
 const MIN_BONE_LENGTH: f64 = 1e-4;
 /// Minimum height of hips above the floor, as a fraction of the height of the skeleton's vertices.
 const MIN_HIP_HEIGHT: f64 = 0.1;
+/// Largest difference between components of two transforms that is rounding, as a fraction of their scale.
+const MAX_ROUNDING: f64 = 1e-5;
 /// Minimum number of enclosed vertices for fitting a rigid motion.
 const MIN_RIGID_VERTICES: usize = 3;
 /// Limits of the factor that scales the translations in clips of a skeleton, relative to the change of the skeleton's
@@ -49,6 +51,9 @@ pub(super) struct NodeUpdate {
     pub(super) world: Vec<DMat4>,
     /// `[n_nodes]`
     pub(super) moves: Vec<NodeMove>,
+    /// Nodes of rigid meshes that cannot move rigidly, because the nodes above scale differently along their axes: a
+    /// translation, a rotation and a scale cannot express the shear.
+    pub(super) sheared: Vec<u32>,
     pub(super) n_moved: usize,
     /// Number of joints outside the cage that carry vertices.
     pub(super) n_outside: usize,
@@ -74,13 +79,13 @@ pub(super) struct NamedMoves {
     pub(super) of_nodes: Vec<Option<NodeMove>>,
     /// Whether each node carries vertices in one of the files. `[n_nodes]`
     pub(super) holds: Vec<bool>,
+    /// Size of this document's skeleton as a multiple of that of the shared skeleton.
+    pub(super) scale: f64,
 }
 
 /// The deformation that [`Rig::moved`] applies to the nodes.
 pub(super) struct Deformation<'a> {
     pub(super) by: &'a [DVec3],
-    /// Size of this document's skeleton as a multiple of that of the shared skeleton.
-    pub(super) scale: f64,
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,
@@ -217,6 +222,7 @@ impl Rig<'_> {
             nodes: root.nodes.clone(),
             world: self.worlds.world.clone(),
             moves: vec![still; n],
+            sheared: Vec::new(),
             n_moved: 0,
             n_outside: 0,
             n_follow_parent: 0,
@@ -240,55 +246,67 @@ impl Rig<'_> {
             let i = node as usize;
             let follows =
                 anchors[i].is_some() || given.joints != Joints::Stay && given.named_move(i).is_some();
-            if !follows {
-                continue;
-            }
+            // The transform that the nodes above have reached, so that errors do not add up along chains of nodes.
             let [above, above_new] =
-                [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
-            let from = local(&root.nodes[i]);
-            let NodeMove { ratio, is_top, .. } = moved.moves[i];
-            let moving = DMat3::from_diagonal(DVec3::splat(ratio));
-            if new[i] == old[i] && above == above_new {
-                if is_top && ratio != 1.0 {
-                    // A root that stays where it is, such as one on the floor outside the cage, travels with the
-                    // skeleton.
-                    let at = from.w_axis.truncate();
-                    moved.changes[i] =
-                        Some(NodeChange { from: at, to: at, still: moving, moving, turn: None });
-                }
-                continue;
+                [old, &moved.world].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
+            if follows {
+                moved.changes[i] = self.change(i, [above, above_new], new[i], &mut moved, json);
             }
-            let to = above_new.inverse() * new[i];
-            if !to.is_finite() {
-                continue;
+            moved.world[i] = above_new * local(&moved.nodes[i]);
+            let [reached, wanted] = [moved.world[i], new[i]].map(DMat3::from_mat4);
+            let rounding = MAX_ROUNDING * wanted.determinant().abs().cbrt();
+            if given.rigid.contains_key(&node) && !reached.abs_diff_eq(wanted, rounding) {
+                moved.sheared.push(node);
             }
-            moved.n_moved += 1;
-            let turns = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
-                || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
-            let turn = set_local(&mut moved.nodes[i], &mut json["nodes"][i], &to, turns);
-            // Bone lengths are relative to the parent's scale.
-            let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
-            let [t0, t1] = [from, to].map(|m| m.w_axis.truncate());
-            let still = if is_top {
-                moving
-            } else if t0.length().min(t1.length()) > MIN_BONE_LENGTH * self.diagonal / scale {
-                let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
-                DMat3::from_quat(turn) * (t1.length() / t0.length())
-            } else {
-                DMat3::IDENTITY
-            };
-            moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
-        }
-        if moved.n_moved > 0 {
-            let mut root = root.clone();
-            root.nodes = std::mem::take(&mut moved.nodes);
-            // This cannot fail: the hierarchy of the original document was checked and has not changed.
-            if let Ok(worlds) = Worlds::new(&root) {
-                moved.world = worlds.world;
-            }
-            moved.nodes = root.nodes;
         }
         moved
+    }
+
+    /// Moves node `i` towards the world transform `new`: writes its local transform and returns the change. `above`: the
+    /// transforms of its parent before and after the deformation.
+    fn change(
+        &self,
+        i: usize,
+        [above, above_new]: [DMat4; 2],
+        new: DMat4,
+        moved: &mut NodeUpdate,
+        json: &mut Value,
+    ) -> Option<NodeChange> {
+        let old = self.worlds.world[i];
+        let from = local(&self.document.root.nodes[i]);
+        let NodeMove { ratio, is_top, .. } = moved.moves[i];
+        let moving = DMat3::from_diagonal(DVec3::splat(ratio));
+        if new == old && above == above_new {
+            // A root that stays where it is, such as one on the floor outside the cage, travels with the skeleton.
+            let at = from.w_axis.truncate();
+            return (is_top && ratio != 1.0).then_some(NodeChange {
+                from: at,
+                to: at,
+                still: moving,
+                moving,
+                turn: None,
+            });
+        }
+        let to = above_new.inverse() * new;
+        if !to.is_finite() {
+            return None;
+        }
+        moved.n_moved += 1;
+        let turns = DMat3::from_mat4(new) != DMat3::from_mat4(old)
+            || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
+        let turn = set_local(&mut moved.nodes[i], &mut json["nodes"][i], &to, turns);
+        // Bone lengths are relative to the parent's scale.
+        let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
+        let [t0, t1] = [from, to].map(|m| m.w_axis.truncate());
+        let still = if is_top {
+            moving
+        } else if t0.length().min(t1.length()) > MIN_BONE_LENGTH * self.diagonal / scale {
+            let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
+            DMat3::from_quat(turn) * (t1.length() / t0.length())
+        } else {
+            DMat3::IDENTITY
+        };
+        Some(NodeChange { from: t0, to: t1, still, moving, turn })
     }
 
     /// Index of the point that each node follows; `None` for the others. If the skeleton stays, only nodes of rigid
@@ -455,7 +473,8 @@ impl Rig<'_> {
 /// and, if it `turns`, a rotation. Returns the change of its rotation.
 fn set_local(node: &mut Node, json: &mut Value, to: &DMat4, turns: bool) -> Option<DQuat> {
     if node.matrix.is_some() {
-        let matrix = to.as_mat4().to_cols_array();
+        let linear = DMat3::from_mat4(if turns { *to } else { local(node) });
+        let matrix = DMat4::from_mat3_translation(linear, to.w_axis.truncate()).as_mat4().to_cols_array();
         json["matrix"] = json!(matrix);
         node.matrix = Some(matrix);
         return None;

@@ -1,9 +1,11 @@
 //! Reshapes a rigged document and writes it.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use cagework_pose::Parts;
+use cagework_pose::parts::Motion;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -12,6 +14,7 @@ use super::binds::write_binds;
 use super::edit::Edit;
 use super::feet::Feet;
 use super::ground::{Ground, MIN_LIFT};
+use super::lattice::ends;
 use super::nodes::{Deformation, Joints};
 use super::poses::PoseDisplacements;
 use super::report::ReshapeReport;
@@ -126,9 +129,12 @@ pub(crate) fn reshape(
         report.joints_outside = moved.n_outside;
         report.joints_following_parent = moved.n_follow_parent;
         let binds = write_binds(rig, &mut edit, (by, &moved.world));
-        let turned = SurfaceGradients::new(triangles, by);
+        // Vertices of rigid meshes stay, unless their node cannot move rigidly.
+        let sheared = |node: &u32| moved.sheared.contains(node);
+        let with_rigid = rig.moved_rigidly(by, |node| motions.get(&node).filter(|_| sheared(&node)));
+        let turned = SurfaceGradients::new(triangles, &with_rigid);
         for part in &rig.parts {
-            if part.instance.node.is_some_and(|node| motions.contains_key(&node)) {
+            if part.instance.node.is_some_and(|node| motions.contains_key(&node) && !sheared(&node)) {
                 continue;
             }
             let frame = rig.frame(part, &moved.world, &binds)?;
@@ -259,6 +265,26 @@ impl Rig<'_> {
     /// Height by which the model is lifted; 0 if the difference is only rounding.
     fn lift(&self, ground: &Ground) -> f64 {
         Some(ground.lift()).filter(|lift| lift.abs() > MIN_LIFT * self.diagonal).unwrap_or(0.0)
+    }
+
+    /// Displacements of all points, with the meshes of nodes moved rigidly. `motion`: of a node whose mesh is moved.
+    fn moved_rigidly<'m>(
+        &self,
+        by: &'m [DVec3],
+        motion: impl Fn(u32) -> Option<&'m Motion>,
+    ) -> Cow<'m, [DVec3]> {
+        let mut all = Cow::Borrowed(by);
+        for part in &self.parts {
+            let Some(motion) = part.instance.node.and_then(&motion) else { continue };
+            let mut put = |first: usize, at: &[DVec3]| {
+                all.to_mut()[first..].iter_mut().zip(at).for_each(|(by, &at)| *by = motion.by(at));
+            };
+            put(part.first, &part.rest());
+            for (target, first) in ends(part) {
+                put(first, &self.extras[self.range(target, first)]);
+            }
+        }
+        all
     }
 
     /// Number of ends of morph targets outside the cage.

@@ -289,3 +289,46 @@ fn joints_that_show_skinned_meshes_follow_the_cage() {
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
     assert_near(&read(&bytes).positions, &moved, 2e-5, "at rest");
 }
+
+/// [`rigged`] with joints whose scales differ along their axes, and with a cube on the tip.
+fn unevenly_scaled() -> Model {
+    let mut rig = rigged();
+    let mesh = centred_cube(&mut rig);
+    rig.json["nodes"][1]["scale"] = json!([1.0, 2.0, 0.5]);
+    rig.json["nodes"][2]["rotation"] = json!([0.0, 0.28, 0.0, 0.96]);
+    rig.json["nodes"][3]["children"] = json!([5]);
+    rig.push("nodes", json!({ "name": "sword", "mesh": mesh, "translation": [0.1, 0.1, 0.0] }));
+    read(&rig.glb())
+}
+
+/// A translation, a rotation and a scale cannot express the shear of a turned joint below one with such a scale.
+#[test]
+fn origins_of_turned_joints_with_uneven_scales_follow_the_cage() {
+    let model = unevenly_scaled();
+    let origins = |model: &Model| player(model).at(None, 0.0, &[]).origins;
+    for joints in [Joints::Follow, Joints::Turn] {
+        let after = origins(&read(&reshaped(&model, joints).0));
+        for node in [1, 2, 3, 5] {
+            let expected = f(origins(&model)[node]);
+            let off = after[node].distance(expected);
+            assert!(off <= 1e-5, "{joints:?}: node {node} misses {expected} by {off}");
+        }
+    }
+}
+
+#[test]
+fn rigid_props_on_joints_with_uneven_scales_keep_all_lengths() {
+    let model = unevenly_scaled();
+    let lengths = |at: &[Vec3]| -> Vec<f32> {
+        let corners = &at[at.len() - 8..];
+        corners.iter().flat_map(|a| corners.iter().map(move |b| a.distance(*b))).collect()
+    };
+    for joints in [Joints::Follow, Joints::Stay, Joints::Turn] {
+        let options = ReshapeOptions { joints, rigid: vec!["sword".into()], ..ReshapeOptions::default() };
+        let after = read(&model.write_reshaped(&by(&model), &[], &[], &options).unwrap().0);
+        assert!(after.positions.last() != model.positions.last());
+        for (before, after) in lengths(&model.positions).into_iter().zip(lengths(&after.positions)) {
+            assert!((after - before).abs() < 1e-5, "{joints:?}: {after} instead of {before}");
+        }
+    }
+}
