@@ -76,14 +76,14 @@ pub(crate) fn reshape(
     let mut edit = Edit::new(document);
     let grounded;
     let mut by = by;
+    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     let own = options.ground.then(|| rig.ground(by, up));
+    // Vertices are in the unit of the cage. A file without vertices can be in another unit than the body.
+    let unit = named.as_ref().filter(|_| rig.parts.is_empty()).map_or(1.0, |named| named.scale);
     let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground.as_ref());
     let shared = shared.map(|ground| ground.scaled(unit));
     let lift = shared.as_ref().or(own.as_ref()).map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
-    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     if lift != DVec3::ZERO {
-    // Vertices are in the unit of the cage. A file without vertices can be in another unit than the body.
-    let unit = named.as_ref().filter(|_| rig.parts.is_empty()).map_or(1.0, |named| named.scale);
         grounded = by.iter().map(|&by| by + lift).collect::<Vec<_>>();
         by = &grounded;
     }
@@ -323,7 +323,8 @@ impl Rig<'_> {
     }
 }
 
-/// Duplicates meshes that several nodes show with different deformations. The first node keeps the original mesh.
+/// Duplicates meshes that several nodes show with different deformations. The first node keeps the original mesh. Clips
+/// that point to the original mesh also play its copies.
 fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     let mut first = HashMap::new();
     let mut copies = HashMap::new();
@@ -336,7 +337,9 @@ fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
         }
         let copy = *copies.entry(key).or_insert_with(|| {
             let copy = edit.json["meshes"][mesh].clone();
-            push(&mut edit.json, "meshes", copy)
+            let copy = push(&mut edit.json, "meshes", copy);
+            play_copy(&mut edit.json, mesh, copy);
+            copy
         });
         if let Some(node) = instance.node {
             edit.json["nodes"][node as usize]["mesh"] = copy.into();
@@ -344,6 +347,25 @@ fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     }
     if !copies.is_empty() {
         edit.count_uses();
+    }
+}
+
+/// For each channel that points into a mesh (KHR_animation_pointer), adds a channel that points into its copy.
+fn play_copy(json: &mut Value, mesh: usize, copy: usize) {
+    let (pointer, original) =
+        ("/target/extensions/KHR_animation_pointer/pointer", format!("/meshes/{mesh}/"));
+    let animations = json.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        let channels = animation.get_mut("channels").and_then(Value::as_array_mut);
+        let Some(channels) = channels else { continue };
+        let of_copy = |channel: &Value| {
+            let rest = channel.pointer(pointer)?.as_str()?.strip_prefix(&original)?;
+            let mut channel = channel.clone();
+            *channel.pointer_mut(pointer)? = format!("/meshes/{copy}/{rest}").into();
+            Some(channel)
+        };
+        let added: Vec<Value> = channels.iter().filter_map(of_copy).collect();
+        channels.extend(added);
     }
 }
 

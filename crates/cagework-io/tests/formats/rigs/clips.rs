@@ -243,3 +243,25 @@ fn baked_clip_of_one_key_has_one_frame() {
     let input = json["animations"][0]["samplers"][0]["input"].as_u64().unwrap() as usize;
     assert_eq!(json["accessors"][input]["count"], 1);
 }
+
+/// Two nodes with different skins show one mesh, which is copied. A clip that points to the weights of the mesh plays both.
+#[test]
+fn pointers_to_the_weights_of_a_mesh_play_its_copies() {
+    let mut rig = rigged();
+    let skin = rig.json["skins"][0].clone();
+    rig.push("skins", skin);
+    rig.json["skins"][1]["joints"] = serde_json::json!([3, 2, 1]);
+    rig.push("nodes", serde_json::json!({ "name": "other", "mesh": 0, "skin": 1 }));
+    rig.json["scenes"][0]["nodes"] = serde_json::json!([0, 4, 5]);
+    rig.json["animations"][0]["channels"][3]["target"] = serde_json::json!({
+        "path": "pointer", "extensions": { "KHR_animation_pointer": { "pointer": "/meshes/0/weights" } }
+    });
+    rig.json["extensionsUsed"] = serde_json::json!(["KHR_animation_pointer"]);
+    let model = read(&rig.glb());
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    assert_eq!(json_of(&bytes)["meshes"].as_array().unwrap().len(), 2);
+    // The last key of the weights is [1, 0.5].
+    for played in [player(&model), player(&read(&bytes))] {
+        assert_eq!(played.at(Some(0), 1.0, &[]).targets, [1.0, 0.5, 1.0, 0.5]);
+    }
+}
