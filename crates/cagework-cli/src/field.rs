@@ -6,7 +6,7 @@ use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
 use cagework_core::team::Team;
 use cagework_core::words::{counted, grouped};
 use cagework_core::{BindOptions, Cage};
-use cagework_io::{Model, PointFile, UpAxis, shown, write_field_blender, write_field_npz};
+use cagework_io::{Model, ModelFormat, PointFile, UpAxis, shown, write_field_blender, write_field_npz};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -86,6 +86,10 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
         let bytes = export(&model, &mapped.points, &output)?;
         let mut notices = model.notices.clone();
         notices.extend(model.lost_in(output.format));
+        if output.format == ModelFormat::Gltf && model.has_skin_or_targets() {
+            let lost = "the glb file does not keep skins and morph targets; `cagework deform` does";
+            notices.push(lost.into());
+        }
         notices.extend(model.copies_in(output.format, &bytes));
         (bytes, mapped, field.lattice, notices)
     };

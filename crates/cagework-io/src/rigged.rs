@@ -68,6 +68,12 @@ impl Model {
         matches!(&self.document, Document::Gltf(document) if Rig::is_needed(document))
     }
 
+    /// Whether [`Self::write_glb`] drops skins or morph targets.
+    #[must_use]
+    pub fn has_skin_or_targets(&self) -> bool {
+        matches!(&self.document, Document::Gltf(document) if Rig::has_skin_or_targets(document))
+    }
+
     /// Returns the points to bind after the vertices when a rigged model is reshaped: ends of morph targets, joints and
     /// other moving nodes, and offsets stored in a VRM. Empty without a rig. Object units, `[n_points]`.
     ///

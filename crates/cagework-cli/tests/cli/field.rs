@@ -1,6 +1,7 @@
 use predicates::prelude::*;
 use predicates::str::contains;
 
+use crate::rigs;
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, obj_positions};
 
 /// Tolerance of positions, object units: the field is stored and interpolated in `f32`.
@@ -211,4 +212,17 @@ fn slices_of_a_bent_stl_are_mapped_back_and_forth() {
         let height = x.hypot(y).hypot(z) / radius;
         assert!((0.96..1.01).contains(&height), "{x} {y} {z} is at {height} of the radius");
     }
+}
+
+#[test]
+fn rig_that_map_drops_is_a_notice() {
+    let sandbox = rigs::bound();
+    let map = "map humanoid.glb --cage cage.obj --pose wide.obj";
+    let notice = "note: the glb file does not keep skins and morph targets; `cagework deform` does";
+    sandbox.run(&format!("{map} -o out.glb")).success().stdout(contains(notice));
+    // The output has no skin, so the next one loses nothing.
+    sandbox
+        .run(&format!("{map} -o again.glb").replace("humanoid", "out"))
+        .success()
+        .stdout(contains("note:").not());
 }
