@@ -75,6 +75,27 @@ impl Clip {
         times
     }
 
+    /// Times at which STEP tracks jump, seconds, ascending.
+    pub(super) fn jumps(&self) -> Vec<f32> {
+        let steps = self.tracks.iter().filter(|(_, track)| track.interpolation == Interpolation::Step);
+        let jumps = steps.flat_map(|(_, track)| {
+            let values: Vec<&[f32]> = track.values.chunks(track.width).collect();
+            let jumps = (1..values.len()).filter(move |&k| values[k] != values[k - 1]);
+            jumps.map(|k| track.times[k])
+        });
+        let mut times: Vec<f32> = jumps.collect();
+        times.sort_unstable_by(f32::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// Whether all nodes stand still between the keys, because the tracks of their transforms are STEP.
+    pub(super) fn is_stepped(&self) -> bool {
+        let is_weights = |driven| matches!(driven, ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_));
+        let is_step = |track: &Track| track.interpolation == Interpolation::Step;
+        self.tracks.iter().all(|(driven, track)| is_weights(*driven) || is_step(track))
+    }
+
     /// Nodes whose transforms the clip animates; a node occurs once per channel.
     pub(super) fn nodes(&self) -> impl Iterator<Item = usize> {
         self.tracks.iter().filter_map(|(driven, _)| match *driven {

@@ -7,17 +7,20 @@
 //! * **Targets**: during a contact, the mean position of the ankle relative to the ground. Before and after a contact
 //!   the correction fades within [`FADE`] seconds. In a loop, where the last pose equals the first one, contacts and
 //!   fades continue across the seam.
+//! * **Samples**: at equal time steps, at the keys, and on both sides of the jumps of STEP tracks. If all tracks are STEP,
+//!   only at the keys, and the corrected tracks are STEP too.
 //! * **Correction**: thigh and shin rotate so that the ankle reaches its target. The foot keeps its direction.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::scene::{Node, UnitQuaternion};
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 use serde_json::{Value, json};
 
 use super::clip::{Clip, clips, quaternion, vector};
 use super::edit::Edit;
 use super::nodes::holders;
+use super::surface::rotation;
 use crate::error::WriteError;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
@@ -212,7 +215,7 @@ pub(super) fn lock(
         if clip.seconds <= 0.0 || legs.is_empty() {
             continue;
         }
-        let times = times(clip);
+        let times = if clip.is_stepped() { keys(clip) } else { times(clip) };
         let rest = old.at(None, 0.0);
         let lengths: Vec<f64> = legs.iter().map(|&leg| rest.length(leg)).collect();
         // Keep only the ankles' paths. The poses of all samples can take gigabytes, so they are evaluated again below.
@@ -258,7 +261,8 @@ pub(super) fn lock(
                 }
             }
         }
-        write(&mut edit, number, &times, &rotations);
+        let interpolation = if clip.is_stepped() { "STEP" } else { "LINEAR" };
+        write(&mut edit, number, (&times, interpolation), &rotations);
     }
     contacts.slide = contacts.slide.map(|slide| slide / contacts.n.max(1) as f64);
     if contacts.n == 0 {
@@ -267,19 +271,35 @@ pub(super) fn lock(
     Ok((edit.finish()?, contacts))
 }
 
-/// Computes the times of samples, seconds, ascending: equally spaced times and the keys of the clip, at most
-/// [`MAX_SAMPLES`] of each kind. Within this limit, there are at least [`RATE`] equally spaced times per second.
+/// Times of the keys of a clip, seconds, ascending, at most [`MAX_SAMPLES`].
+fn keys(clip: &Clip) -> Vec<f64> {
+    let seconds = f64::from(clip.seconds);
+    let keys = clip.times().into_iter().map(f64::from);
+    keys.filter(|t| (0.0..=seconds).contains(t)).take(MAX_SAMPLES).collect()
+}
+
+/// Computes the times of samples, seconds, ascending: equally spaced times, the keys of the clip, and both sides of its
+/// jumps, at most [`MAX_SAMPLES`] of each kind. Within this limit, there are at least [`RATE`] equally spaced times per
+/// second.
 pub(super) fn times(clip: &Clip) -> Vec<f64> {
     let seconds = f64::from(clip.seconds);
     let n = ((seconds * RATE).ceil() as usize).clamp(2, MAX_SAMPLES);
-    let mut all: Vec<f64> = (0..=n).map(|k| seconds * k as f64 / n as f64).collect();
-    all.extend(
-        clip.times().into_iter().map(f64::from).filter(|t| (0.0..=seconds).contains(t)).take(MAX_SAMPLES),
-    );
-    all.sort_unstable_by(f64::total_cmp);
-    // Merge times that differ only by rounding.
-    all.dedup_by(|a, b| *a - *b < 1e-5);
-    all
+    let equal = (0..=n).map(|k| seconds * k as f64 / n as f64);
+    let sides = clip.jumps().into_iter().take(MAX_SAMPLES / 2).flat_map(|t| [t.next_down(), t]);
+    // Each time, and whether it is a side of a jump.
+    let mut all: Vec<(f64, bool)> = equal.chain(keys(clip)).map(|t| (t, false)).collect();
+    all.extend(sides.map(|t| (f64::from(t), true)));
+    all.retain(|(t, _)| (0.0..=seconds).contains(t));
+    all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    // Merge times that differ only by rounding, except the two sides of a jump.
+    all.dedup_by(|next, last| {
+        let is_same = next.0 == last.0 || next.0 - last.0 < 1e-5 && !(next.1 && last.1);
+        if is_same && next.1 {
+            *last = *next;
+        }
+        is_same
+    });
+    all.into_iter().map(|(t, _)| t).collect()
 }
 
 /// Horizontal part of a vector.
@@ -456,8 +476,12 @@ fn corrections(
     by
 }
 
-fn turn_of(world: DMat4) -> DQuat {
-    world.to_scale_rotation_translation().1
+/// The rotation in `space` that is `turn` in world space. A mirrored space reverses its direction. Not finite if the space
+/// is singular.
+fn turn_within(space: DMat4, turn: DQuat) -> DQuat {
+    let space = DMat3::from_mat4(space);
+    let turn = rotation(space.inverse() * DMat3::from_quat(turn) * space);
+    turn.map_or(DQuat::NAN, |turn| DQuat::from_mat3(&turn))
 }
 
 /// Computes the local rotations of a leg whose ankle moves by `by`, and the ankle's position.
@@ -468,8 +492,7 @@ fn reach(pose: &Pose, parents: &[Option<usize>], leg: Leg, by: DVec3) -> ([DQuat
     });
     let [hip, knee, ankle] = leg.map(|node| pose.place(node));
     let (thigh, shin) = ((knee - hip).length(), (ankle - knee).length());
-    let is_mirrored = leg.iter().any(|&node| pose.world[node].determinant() <= 0.0);
-    if by.length() <= 1e-9 * (thigh + shin) || is_mirrored || thigh.min(shin) <= 0.0 {
+    if by.length() <= 1e-9 * (thigh + shin) || thigh.min(shin) <= 0.0 {
         return (own, ankle);
     }
     let to = ankle + by - hip;
@@ -487,16 +510,31 @@ fn reach(pose: &Pose, parents: &[Option<usize>], leg: Leg, by: DVec3) -> ([DQuat
         DQuat::from_rotation_arc((first * (knee - hip)).normalize(), (bent - hip).normalize()) * first;
     let lower =
         DQuat::from_rotation_arc((upper * (ankle - knee)).normalize(), (end - bent).normalize()) * upper;
-    let above = parents[leg[0]].map_or(DQuat::IDENTITY, |parent| turn_of(pose.world[parent]));
-    let world = leg.map(|node| turn_of(pose.world[node]));
-    let turned = [upper * world[0], lower * world[1], world[2]];
-    let local =
-        [above.inverse() * turned[0], turned[0].inverse() * turned[1], turned[1].inverse() * turned[2]];
-    if local.iter().all(|q| q.is_finite()) { (local.map(DQuat::normalize), end) } else { (own, ankle) }
+    let above = parents[leg[0]].map_or(DMat4::IDENTITY, |parent| pose.world[parent]);
+    let turned = [
+        turn_within(above, upper) * own[0],
+        turn_within(pose.world[leg[0]], upper.inverse() * lower) * own[1],
+        turn_within(pose.world[leg[1]], lower.inverse()) * own[2],
+    ];
+    if !turned.iter().all(|q| q.is_finite()) {
+        return (own, ankle);
+    }
+    let turned = turned.map(DQuat::normalize);
+    let reached = leg.iter().zip(turned).fold(above, |above, (&node, turn)| {
+        let mut node = pose.nodes[node].clone();
+        node.rotation = Some(UnitQuaternion(turn.as_quat().to_array()));
+        above * local(&node)
+    });
+    (turned, reached.w_axis.truncate())
 }
 
 /// Replaces the rotation tracks of a clip.
-fn write(edit: &mut Edit<'_>, clip: usize, times: &[f64], rotations: &BTreeMap<usize, Vec<DQuat>>) {
+fn write(
+    edit: &mut Edit<'_>,
+    clip: usize,
+    (times, interpolation): (&[f64], &str),
+    rotations: &BTreeMap<usize, Vec<DQuat>>,
+) {
     let seconds: Vec<[f32; 1]> = times.iter().map(|&t| [t as f32]).collect();
     let input = edit.write(None, &seconds, false, true);
     for (&node, all) in rotations {
@@ -514,7 +552,7 @@ fn write(edit: &mut Edit<'_>, clip: usize, times: &[f64], rotations: &BTreeMap<u
         let sampler = push(
             animation,
             "samplers",
-            json!({ "input": input, "output": output, "interpolation": "LINEAR" }),
+            json!({ "input": input, "output": output, "interpolation": interpolation }),
         );
         let channels = animation["channels"].as_array_mut();
         let own = channels

@@ -289,3 +289,51 @@ fn hands_near_the_ground_are_feet() {
         assert_eq!(report.feet.unwrap()[0], legs, "{lift}");
     }
 }
+
+/// A mirrored armature walks as the armature itself, with the sides exchanged.
+#[test]
+fn feet_of_a_mirrored_armature_are_held() {
+    let mut b = walker_from(0.0, false);
+    b.push("nodes", json!({ "name": "mirror", "scale": [1.0, 1.0, -1.0], "children": [0] }));
+    b.json["scenes"] = json!([{ "nodes": [8, 7] }]);
+    let options = ReshapeOptions { feet: Feet::Lock, ..ReshapeOptions::default() };
+    let [plain, mirrored] = [walker(false), b.glb()].map(|glb| reshaped(&read(&glb), 0.0, &options));
+    for report in [&plain.1, &mirrored.1] {
+        assert!(report.slide[0] > 0.01 && report.slide[1] <= 0.25 * report.slide[0], "{report:?}");
+    }
+    assert!((mirrored.1.slide[1] - plain.1.slide[1]).abs() < 1e-5, "{:?} {:?}", mirrored.1, plain.1);
+    for k in 0..50 {
+        let at = |glb: &[u8]| player(&read(glb)).at(Some(0), 0.04 * k as f32, &[]).origins[..7].to_vec();
+        let expected: Vec<Vec3> = at(&plain.0).iter().map(|&p| p.with_z(-p.z)).collect();
+        super::assert_near(&at(&mirrored.0), &expected, 1e-5, &format!("key {k}"));
+    }
+}
+
+/// Where all tracks of the legs are STEP, the hips stand still between two keys, and so does a held foot. Another track
+/// can be LINEAR.
+#[test]
+fn feet_are_held_between_the_keys_of_step_tracks() {
+    for with_linear in [false, true] {
+        let mut b = walker_from(0.0, false);
+        for sampler in b.json["animations"][0]["samplers"].as_array_mut().unwrap() {
+            sampler["interpolation"] = "STEP".into();
+        }
+        if with_linear {
+            let (times, scales) = (floats(&[0.0, CYCLES * CYCLE]), floats(&[1.0; 6]));
+            let input = b.accessor(&times, F32, 2, "SCALAR");
+            let output = b.accessor(&scales, F32, 2, "VEC3");
+            let clip = &mut b.json["animations"][0];
+            clip["samplers"].as_array_mut().unwrap().push(json!({ "input": input, "output": output }));
+            let channel = json!({ "sampler": 7, "target": { "node": 3, "path": "scale" } });
+            clip["channels"].as_array_mut().unwrap().push(channel);
+        }
+        let model = read(&b.glb());
+        let [free, locked] = [Feet::Free, Feet::Lock]
+            .map(|feet| reshaped(&model, 0.0, &ReshapeOptions { feet, ..ReshapeOptions::default() }));
+        let [before, after] = [&free.0, &locked.0].map(|glb| slide(glb, 0.0));
+        let what = format!("{with_linear}: {before} {after} {:?}", locked.1);
+        assert!(before > 0.01 && after <= 0.25 * before, "{what}");
+        let [before, after] = locked.1.slide;
+        assert!(before > 0.01 && after <= 0.25 * before, "{what}");
+    }
+}
