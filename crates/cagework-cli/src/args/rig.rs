@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cagework_io::{Feet, Joints, Model, ReshapeOptions, SelectError, shown};
+use cagework_io::{Feet, Joints, Model, ReshapeOptions, ReshapeReport, SelectError, shown};
 use clap::Args;
 
 use crate::error::CliError;
@@ -139,6 +139,12 @@ impl RigArgs {
     /// Whether `--joints stay` leaves the skeleton at rest.
     pub(crate) fn stays(&self) -> bool {
         self.joints == Joints::Stay
+    }
+
+    /// Whether a model takes the travel of its clips or the turns of its joints from its own vertices, unless a skeleton
+    /// gives them.
+    pub(crate) fn depends_on_vertices(&self, report: &ReshapeReport) -> bool {
+        self.joints == Joints::Turn && report.joints_moved > 0 || !self.keep_travel && report.tracks > 0
     }
 
     /// Returns the part names that `--rigid` and `--mask` give.

@@ -372,6 +372,17 @@ impl Binder<'_> {
                 self.options().memory_limit >> 20
             ));
         }
+        let is_own = |outcome: &Outcome| {
+            let Outcome::Written(report) = outcome else { return false };
+            report.rig.as_ref().is_some_and(|rig| self.args.rig.depends_on_vertices(rig))
+        };
+        let n_own = models.iter().filter(|entry| is_own(&entry.outcome)).count();
+        if self.args.skeleton.is_none() && n_own > 1 {
+            notices.push(format!(
+                "{n_own} models take the travel of clips and the turns of joints from their own vertices: if they share \
+                 a rig, give its body with --skeleton"
+            ));
+        }
         RefitSummary {
             output: self.args.output.display().to_string(),
             cage_vertices: n_cage,

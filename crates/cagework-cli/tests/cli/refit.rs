@@ -329,7 +329,14 @@ fn clips_without_a_mesh_follow_the_body() {
         edited(&sandbox.read("walk.glb"), |json, _| json["animations"][0]["name"] = "Stroll".into());
     sandbox.write("stroll.glb", renamed);
     let tall = "--cage cage.obj --pose tall.obj -g 24 --skeleton humanoid.glb";
-    sandbox.run(&format!("refit humanoid.glb walk.glb stroll.glb {tall} -o free")).success();
+    let notice = "note: 2 models take the travel of clips and the turns of joints from their own vertices";
+    sandbox.write("twin.glb", &body);
+    let alone = tall.replace("--skeleton humanoid.glb", "");
+    sandbox.run(&format!("refit humanoid.glb twin.glb {alone} -o apart")).success().stdout(contains(notice));
+    sandbox
+        .run(&format!("refit humanoid.glb walk.glb stroll.glb {tall} -o free"))
+        .success()
+        .stdout(contains("from their own vertices").not());
     sandbox.run(&format!("refit humanoid.glb walk.glb stroll.glb {tall} --ground -o stands")).success();
     sandbox
         .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose tall.obj --ground -o alone.glb")
