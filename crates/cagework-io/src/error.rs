@@ -80,8 +80,8 @@ pub enum WriteError {
         /// Largest number that is accepted.
         limit: u64,
     },
-    /// The original document cannot be patched, for the reason given.
-    #[error("the original document cannot be patched: {0}")]
+    /// The original document cannot be changed, for the reason given.
+    #[error("the original document cannot be changed: {0}")]
     Document(String),
 }
 
