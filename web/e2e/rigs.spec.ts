@@ -102,6 +102,16 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
     await page.getByRole("application").blur();
   });
 
+  await test.step("the picture of a saved pose leaves the frame as it is", async () => {
+    const frame = await shownFrame(page);
+    const picture = await drawing(page);
+    await page.getByRole("button", { name: "Save pose" }).click();
+    await expect(page.locator(".poses > li").last().locator("img")).toBeVisible();
+    expect(largestMove(frame, await shownFrame(page))).toBe(0);
+    await expect.poll(async () => picture.equals(await drawing(page))).toBe(true);
+    await page.getByRole("button", { name: "Undo" }).click();
+  });
+
   await test.step("joints are drawn", async () => {
     const picture = () => drawing(page);
     const without = await picture();

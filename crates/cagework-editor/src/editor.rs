@@ -36,6 +36,8 @@ pub struct Editor {
     topology: Topology,
     symmetry: Symmetry,
     editing_rest: bool,
+    /// Number of steps after the one with which reshaping has reset a pose; `None` if it has reset none.
+    reset_at: Option<u64>,
     /// Whether a model was painted since the last step.
     is_painting: bool,
     gesture: Option<Gesture>,
@@ -330,16 +332,28 @@ impl Editor {
         self.editing_rest
     }
 
-    /// Starts or ends reshaping. Resets the pose to the rest position.
-    pub fn set_editing_rest(&mut self, editing: bool) {
-        if self.editing_rest != editing {
-            self.editing_rest = editing;
-            self.gesture = None;
-            if !editing {
-                self.tools.element = Element::Vertex;
-            }
+    /// Starts or ends reshaping. The start resets the pose to the rest position, as a step with this label. The end removes
+    /// this step, which restores the pose, if it contains no other change and nothing has changed since.
+    pub fn set_editing_rest(&mut self, editing: bool, label: &str) {
+        if self.editing_rest == editing {
+            return;
+        }
+        self.editing_rest = editing;
+        self.gesture = None;
+        if editing {
+            let is_committed = self.document.is_same(&self.committed);
+            self.reset_pose();
+            self.reset_at = (self.commit(label) && is_committed).then_some(self.steps);
+            return;
+        }
+        self.tools.element = Element::Vertex;
+        let is_unchanged = self.reset_at == Some(self.steps) && self.document.is_same(&self.committed);
+        if is_unchanged {
+            self.go(History::retract);
+        } else {
             self.reset_pose();
         }
+        self.reset_at = None;
     }
 
     pub(crate) fn reset_pose(&mut self) {

@@ -57,6 +57,11 @@ impl History {
         true
     }
 
+    /// Like [`Self::undo`], and drops the step.
+    pub(crate) fn retract(&mut self, now: &mut Document) -> bool {
+        self.undo(now) && self.undone.pop().is_some()
+    }
+
     /// Swaps `now` for the document after the step that was undone last; false if there is no such step.
     pub(crate) fn redo(&mut self, now: &mut Document) -> bool {
         let Some(mut step) = self.undone.pop() else { return false };

@@ -103,9 +103,9 @@ mod tests {
     #[test]
     fn faces_are_selected_only_while_the_cage_is_reshaped() {
         let mut editor = Editor::default();
-        editor.set_editing_rest(true);
+        editor.set_editing_rest(true, "reset");
         editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &FrontView);
-        editor.set_editing_rest(false);
+        editor.set_editing_rest(false, "reset");
         assert_eq!(editor.tools().element, Element::Vertex);
     }
 }

@@ -140,8 +140,9 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     assert_eq!(editor.key(), first_key, "weights do not depend on parts");
     step(&mut editor, &mut documents, Command::ResetPose);
 
-    editor.set_editing_rest(true);
-    assert!(!editor.commit("nothing was posed"));
+    let steps = editor.view().steps;
+    editor.set_editing_rest(true, "reset");
+    assert_eq!(editor.view().steps, steps, "nothing was posed");
     editor.selection.change(&[0, 1, 2], SelectMode::Replace);
     assert!(editor.shift(Vec3::new(-0.05, -0.05, -0.05)));
     step(&mut editor, &mut documents, Command::MoveRest);
@@ -153,7 +154,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let place = editor.bounds().unwrap().center();
     step(&mut editor, &mut documents, Command::AddControl { kind: InnerKind::Point, places: vec![place] });
     assert!(editor.document().fitting_poses().next().is_none(), "the cage has one more control");
-    editor.set_editing_rest(false);
+    editor.set_editing_rest(false, "reset");
     step(&mut editor, &mut documents, Command::RemoveModel { id: hat });
 
     // Undo all steps, then redo them. After each step the document must equal the recorded one.
@@ -453,6 +454,29 @@ fn displacements(editor: &Editor) -> Vec<Vec3> {
     pairs.map(|(posed, rest)| *posed - *rest).collect()
 }
 
+/// Reshaping shows the cage at rest. Ending it without an edit restores the pose, and leaves no step.
+#[test]
+fn the_pose_returns_after_reshaping_without_an_edit() {
+    let mut editor = opened_with_box();
+    let posed: Vec<Vec3> = editor.document().pose.iter().map(|p| *p + Vec3::X).collect();
+    editor.apply(Command::SetPose { positions: posed.clone() }).unwrap();
+    editor.commit("Pose");
+    editor.set_editing_rest(true, "Reset");
+    assert!(!editor.document().is_posed());
+    assert_eq!(editor.view().undo.as_deref(), Some("Reset"));
+    editor.set_editing_rest(false, "Reset");
+    assert_eq!(*editor.document().pose, *posed);
+    assert_eq!((editor.view().undo.as_deref(), editor.view().redo), (Some("Pose"), None));
+
+    editor.set_editing_rest(true, "Reset");
+    editor.selection.change(&[7], SelectMode::Replace);
+    assert!(editor.shift(Vec3::splat(0.2)));
+    editor.apply(Command::MoveRest).unwrap();
+    editor.commit("Move");
+    editor.set_editing_rest(false, "Reset");
+    assert!(!editor.document().is_posed(), "the pose belongs to the cage before the edit");
+}
+
 /// Each vertex keeps its displacement; a new or merged one has the mean of those that it was made from.
 #[test]
 fn saved_poses_keep_their_displacements_when_the_cage_is_reshaped() {
@@ -463,7 +487,7 @@ fn saved_poses_keep_their_displacements_when_the_cage_is_reshaped() {
     editor.apply(Command::SetPose { positions }).unwrap();
     editor.apply(Command::SavePose { name: "there".to_owned() }).unwrap();
     editor.commit("Save");
-    editor.set_editing_rest(true);
+    editor.set_editing_rest(true, "reset");
     let check = |editor: &Editor, expected: &[Vec3], what: &str| {
         assert!(editor.view().poses[0].fits, "{what}");
         let found = displacements(editor);

@@ -187,7 +187,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
                         let there: Vec<u32> = vertices.into_iter().filter(|&v| v < n).collect();
                         editor.selection.change(&there, SelectMode::Replace);
                     }
-                    UserAction::Reshape(on) => editor.set_editing_rest(on),
+                    UserAction::Reshape(on) => editor.set_editing_rest(on, "reset"),
                     UserAction::Shift(by) => drop(editor.shift(by)),
                     UserAction::Commit => {
                         let was_committed = editor.commit("step");

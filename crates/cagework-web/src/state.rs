@@ -445,10 +445,7 @@ impl State {
         let positions = pose
             .map(|pose| Arc::clone(&pose.positions))
             .ok_or_else(|| Fault::missing("such pose", "wait until the cage of the pose is ready"))?;
-        if let Some(playing) = &mut self.playing {
-            playing.is_new = true;
-            main.stop_playing();
-        }
+        main.interrupt_playing(true);
         main.pose(&positions[..main.cage_positions().len()]);
         if let Some(lattice) = self.lattice.as_ref().filter(|_| self.models().splats().is_some()) {
             main.set_field(Some(lattice.pose(&self.rest().positions, &positions)), &positions);
@@ -601,10 +598,10 @@ mod tests {
     #[test]
     fn pulling_picks_vertices_whatever_element_was_chosen_for_reshaping() {
         let mut state = uploaded();
-        state.editor.set_editing_rest(true);
+        state.editor.set_editing_rest(true, "reset");
         state.editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &state.camera);
         assert_eq!(state.element(), Element::Face);
-        state.editor.set_editing_rest(false);
+        state.editor.set_editing_rest(false, "reset");
         state.editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &state.camera);
         assert_eq!(state.element(), Element::Vertex);
         state.view.pull = false;

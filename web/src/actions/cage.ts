@@ -36,6 +36,13 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     return true;
   };
 
+  /** Undoes steps until the cage with this identifier is back. Undoes nothing if the history has forgotten it. */
+  const undoTo = (id: number) => {
+    if (ctx.store.get().cageId === id || !engine().undo()) return;
+    undoTo(id);
+    if (ctx.store.get().cageId !== id) engine().redo();
+  };
+
   /** Replaces the cage and adds an undo step, except for the first cage of a model that was not changed. */
   const take = (label: string, cage: CheckedCage) => {
     edit.settle();
@@ -47,7 +54,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     // A first cage or one from a file may not fit into the view.
     if (!before || label === T.did.loadCage) engine().frameAll();
     if (!before || !(posed || saved.length > 0)) return;
-    const back = { label: T.pose.backToCage, run: () => void engine().undo() };
+    const back = { label: T.pose.backToCage, run: () => undoTo(before.id) };
     const carry = { label: T.pose.carry, run: () => void poses.carry(before, T.did.carry) };
     ctx.tell.say(T.cage.posesWait(saved.length), carry, back);
   };

@@ -98,10 +98,6 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
       : ctx.session().readSettings(opened.settings, memory_limit);
   };
 
-  const goTo = (from: readonly StepName[], step: StepName) => {
-    if (from.includes(store.get().step)) store.set({ step });
-  };
-
   /**
    * If a bind with the options of a project would exceed `MAX_UPDATES`, replaces the options by the defaults. Keeps
    * the memory limit.
@@ -125,6 +121,13 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
     isProject: boolean,
   ) => {
     const familiar = isSample || isProject;
+    let shown = store.get().step;
+    /** Goes on to `step` from one of the steps `from`, unless the user has chosen another step in the meantime. */
+    const goTo = (from: readonly StepName[], step: StepName) => {
+      if (store.get().step !== shown || !from.includes(shown)) return;
+      shown = step;
+      store.set({ step });
+    };
     if (cageFiles) {
       if (!(await needs.cage.load(cageFiles, true))) return;
     } else if (!store.get().cage) {

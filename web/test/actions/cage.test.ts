@@ -53,6 +53,34 @@ it("poses of the previous cage do not fit a new cage: the page offers to carry t
   expect(carried).toMatchObject([{ poses: Float32Array.of(7), shares: [0.5] }]);
 });
 
+it("going back to the previous cage undoes the steps since, and nothing if the cage is back already", async () => {
+  const { cage, asked, show, showCage, teach, offers } = page();
+  showCage(cageOf(8, 1));
+  show({ cageId: 1, posed: true });
+  // The cage of each step, the newest last.
+  const cages = [1, 2, 2];
+  let undone = 0;
+  teach({
+    undo() {
+      const before = cages.at(-2 - undone);
+      if (before === undefined) return false;
+      undone += 1;
+      show({ cageId: before });
+      return true;
+    },
+  });
+  const made = cage.make();
+  await settled();
+  asked[0]?.resolve(cageOf(12, 2));
+  await made;
+  show({ cageId: 2 });
+  const back = offers()[1];
+  back?.run();
+  expect(undone, "a pull and the new cage").toBe(2);
+  back?.run();
+  expect(undone).toBe(2);
+});
+
 it("adding a control carries the poses over; smoothing does not need to", () => {
   const { cage, engine, commands, carried, showCage, teach } = page();
   showCage(cageOf(4));

@@ -8,7 +8,8 @@ import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED_FILE, settled } fr
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
 
-function page() {
+/** `making`: called while the cage is made. */
+function page(making = () => undefined) {
   const fake = createFake();
   const steps: string[] = [];
   const does = (step: string) => async () => steps.push(step) > 0;
@@ -20,6 +21,7 @@ function page() {
     bind: { start: does("bind") },
     cage: {
       async make() {
+        making();
         fake.showCage(cageOf(8));
         return steps.push("make a cage") > 0;
       },
@@ -54,6 +56,18 @@ it("asks whether to stand a model up that seems to lie on its back", async () =>
   offers()[0]?.run();
   await settled();
   expect(asked.at(-1)).toMatchObject({ kind: "turn", input: { up: "z" } });
+});
+
+it("a step that the user chooses while the cage is made stays", async () => {
+  const { files, asked, store, steps } = page(() => void store.set({ step: "model" }));
+  const opened = files.openFiles([file("cube.obj")]);
+  await settled();
+  asked[0]?.resolve({ vertices: 4 });
+  await settled();
+  asked[1]?.resolve(OPENED_FILE);
+  await opened;
+  await settled();
+  expect([steps.at(-1), store.get().step]).toEqual(["bind", "model"]);
 });
 
 it("a dropped model gets a cage and is bound; the previous work is saved first", async () => {

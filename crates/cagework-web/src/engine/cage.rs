@@ -166,15 +166,13 @@ impl Engine {
         })
     }
 
-    /// Starts or ends reshaping the cage. If the start resets a pose, adds a step to the history with this label.
+    /// Starts or ends reshaping the cage. If the start resets a pose, adds a step to the history with this label, which
+    /// the end removes if nothing has changed since.
     #[wasm_bindgen(js_name = setEditingRest)]
     pub fn set_editing_rest(&self, editing: bool, label: &str) {
         self.change(|state| {
-            state.editor.set_editing_rest(editing);
+            state.editor.set_editing_rest(editing, label);
             state.is_changed = true;
-            if editing {
-                state.editor.commit(label);
-            }
         });
     }
 
