@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::{InnerElement, PolygonMesh};
-use cagework_io::{Interpolation, SECONDS_PER_POSE, check_times};
+use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, TimelineError, check_times};
 use cagework_pose::blend::reblend;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -425,7 +425,20 @@ impl Editor {
         };
         own.0 = seconds;
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        check_times(&timed.iter().map(|(at, _)| *at).collect::<Vec<_>>())?;
+        let times: Vec<f32> = timed.iter().map(|(at, _)| *at).collect();
+        check_times(&times).map_err(|error| {
+            let name = |pose: usize| document.poses[pose].name.to_string();
+            let limit = match error {
+                TimelineError::OutOfRange { .. } => format!("times are from 0 to {MAX_SECONDS} s"),
+                TimelineError::Order { number, .. } => {
+                    // One of two poses that are too close is this one.
+                    let (before, after) = (timed[number - 2], timed[number - 1]);
+                    let (at, pose) = if before.1 == index { after } else { before };
+                    format!("{} is at {at} s, and poses are at least {MIN_GAP} s apart", name(pose))
+                }
+            };
+            EditError::PoseTime { name: name(index), seconds, limit }
+        })?;
         let mut order: Vec<usize> = (0..document.poses.len()).collect();
         let mut leads: Vec<f32> = document.poses.iter().map(|pose| pose.lead).collect();
         let mut before = 0.0;

@@ -1,7 +1,7 @@
 //! Errors of commands. The document is unchanged after an error.
 
 use cagework_core::{CageError, ControlError};
-use cagework_io::{SelectError, TimelineError, WriteError};
+use cagework_io::{SelectError, WriteError};
 use cagework_pose::blend::VertexCountError;
 use thiserror::Error;
 
@@ -66,8 +66,15 @@ pub enum EditError {
     #[error(transparent)]
     Pose(#[from] VertexCountError),
     /// The animation cannot show a pose at this time.
-    #[error(transparent)]
-    Time(#[from] TimelineError),
+    #[error("{name} cannot be at {seconds} s: {limit}")]
+    PoseTime {
+        /// Name of the pose.
+        name: String,
+        /// Time given for the pose, seconds.
+        seconds: f32,
+        /// The limit that the time exceeds, or the pose that it would meet.
+        limit: String,
+    },
     /// A name selects no part of the model.
     #[error(transparent)]
     Part(#[from] SelectError),

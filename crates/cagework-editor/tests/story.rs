@@ -130,7 +130,13 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let interpolation = Some(Interpolation::Step);
     step(&mut editor, &mut documents, Command::SetPoseInterpolation { index: 2, interpolation });
     assert_eq!(editor.view().poses[2].interpolation, interpolation);
-    assert!(editor.apply(Command::SetPoseTime { index: 2, seconds: 1.25 }).is_err(), "two poses at one time");
+    let mut refusal =
+        |seconds| editor.apply(Command::SetPoseTime { index: 2, seconds }).unwrap_err().to_string();
+    assert_eq!(
+        refusal(1.25),
+        "up cannot be at 1.25 s: again is at 1.25 s, and poses are at least 0.001 s apart"
+    );
+    assert_eq!(refusal(1e9), "up cannot be at 1000000000 s: times are from 0 to 3600 s");
     step(&mut editor, &mut documents, Command::RemovePose { index: 1 });
     assert_eq!(times(&editor), [("left".into(), 0.25), ("up".into(), 1.0)]);
     step(&mut editor, &mut documents, Command::RenamePose { index: 0, name: "to the left".to_owned() });

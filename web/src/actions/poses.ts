@@ -138,7 +138,7 @@ export function createPoses(ctx: Context, edit: Edit) {
     move: (index: number, to: number) => void edit.apply({ do: "move_pose", index, to }, T.did.movePose),
     /** Sets the time of a pose in the animation. Returns false if the time is not allowed. */
     time: (index: number, seconds: number): boolean =>
-      edit.apply({ do: "set_pose_time", index, seconds }, T.did.time),
+      edit.apply({ do: "set_pose_time", index, seconds }, T.did.time, T.failed.time),
     /** Sets the interpolation of the animation towards a pose; null uses that between all poses. */
     interpolation: (index: number, interpolation: Interpolation | null) =>
       void edit.apply({ do: "set_pose_interpolation", index, interpolation }, T.did.interpolation),

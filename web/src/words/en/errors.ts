@@ -27,6 +27,7 @@ export const failed = {
   controlsFile: "These controls cannot be used",
   edit: (what: string) => `${what}: not possible here`,
   write: "The file could not be written",
+  time: "The time was not changed",
   delete: "The kept work could not be deleted",
   sample: "The sample could not be opened",
   open: (name: string) => `${name} could not be opened`,
