@@ -24,6 +24,9 @@ const MAX_PROTRUSION: f64 = 0.02;
 /// Number of intervals into which the axis of a tube is divided to measure its distance from the cage.
 const AXIS_SAMPLES: u32 = 32;
 
+/// Limit on the points at which this distance is measured, each of which is compared with all faces of the cage.
+const MAX_AXIS_SAMPLES: usize = 1000;
+
 /// Owned form of [`Controls`], with optional subdivision and inner controls.
 #[derive(Clone, Debug)]
 pub struct ControlSet {
@@ -114,7 +117,8 @@ impl ControlSet {
     }
 
     /// Distance from the cage's surface to the centres and axes of the balls and tubes in [`Self::reaching`], object
-    /// units: with a smaller radius, none of them reaches through. Axes are sampled.
+    /// units: with a smaller radius, none of them reaches through. Axes are sampled, at [`MAX_AXIS_SAMPLES`] points in
+    /// all.
     pub(crate) fn distance_of_reaching(&self) -> f64 {
         let at = |i: u32| self.inner.positions[i as usize].as_dvec3();
         let of_element = |&element: &u32| match &self.inner.elements[element as usize] {
@@ -134,7 +138,8 @@ impl ControlSet {
             let to = |&f: &u32| closest_point_on_triangle(p, self.surface.facet_corners(f)).point.distance(p);
             facets.iter().map(to).fold(f64::INFINITY, f64::min)
         };
-        self.reaching.iter().flat_map(of_element).map(distance).fold(f64::INFINITY, f64::min)
+        let samples = self.reaching.iter().flat_map(of_element).take(MAX_AXIS_SAMPLES);
+        samples.map(distance).fold(f64::INFINITY, f64::min)
     }
 
     /// Computes the positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`,
