@@ -378,7 +378,10 @@ async function start(opened: OpenResult & Needs) {
      * function that removes the listener.
      */
     onFrame: frames.listen,
-    /** Draws the scene as a PNG, up to `MAX_PICTURE` pixels per side. `alone`: only the model, on a transparent background. */
+    /**
+     * Draws the scene as a PNG, up to `MAX_PICTURE` pixels per side. `alone`: only the model, on a transparent
+     * background.
+     */
     async picture(width: number, height: number, alone = false) {
       return pngOf(await engine.picture(width, height, alone), width, height);
     },

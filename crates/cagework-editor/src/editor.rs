@@ -36,7 +36,7 @@ pub struct Editor {
     topology: Topology,
     symmetry: Symmetry,
     editing_rest: bool,
-    /// Number of steps after the one with which reshaping has reset a pose; `None` if it has reset none.
+    /// Value of `steps` after the step with which reshaping reset the pose; `None` without such a step.
     reset_at: Option<u64>,
     /// Whether a model was painted since the last step.
     is_painting: bool,

@@ -25,7 +25,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
             )
         }
         Code::DuplicateVertex => format!(
-            "{} at the same position as another one, but for rounding: at open edges they are joined if their coordinates \
+            "{} at the same position as another one, up to rounding: at open edges they are joined if their coordinates \
              are equal, elsewhere they stay separate handles.",
             with("vertex is", "vertices are")
         ),

@@ -12,6 +12,7 @@
 
 mod buckets;
 mod collapse;
+mod components;
 mod footprint;
 mod gaps;
 mod guarded;
@@ -36,8 +37,8 @@ use glam::{DVec3, Vec3};
 use cagework_core::cage::Cage;
 use cagework_core::disjoint::DisjointSets;
 use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
-use cagework_core::words::{counted, grouped};
 use collapse::Collapser;
+use components::Components;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
 use lattice::{Lattice, MARGIN_VOXELS};
@@ -84,9 +85,6 @@ const MAX_ROWS: f64 = 1.3e8;
 
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
-
-/// Smallest number of vertices of a closed part, a tetrahedron.
-const MIN_PART_VERTICES: usize = 4;
 
 /// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps. Collapsing that many
 /// takes about two seconds.
@@ -148,15 +146,15 @@ fn generate_plain(
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
-    let apart = match (options.per_component, options.shape) {
+    let components = match (options.per_component, options.shape) {
         (true, Shape::Follow) => {
             let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), options, &go_on);
-            parts_apart(|n| Ok(shell(n)?.separate), [base, affordable], target)?
+            Components::find(|n| Ok(shell(n)?.separate), [base, affordable], target)?
         }
-        _ => Apart { parts: 1, voxels: MIN_VOXELS },
+        _ => Components::ONE,
     };
-    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest.max(apart.voxels) };
-    let least = apart.voxels.min(voxels);
+    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest.max(components.voxels) };
+    let least = components.voxels.min(voxels);
     let first = voxels;
     for attempt in 1..=MAX_LATTICES {
         let go_on = |stage: Stage, share: f32| {
@@ -197,7 +195,8 @@ fn generate_plain(
             )
         });
         let closed = gaps.iter().filter_map(|gap| gap.notice(&cage, [first, voxels], options));
-        let notices = apart.notice(parts, options).into_iter().chain(coarser).chain(closed.take(MAX_NOTICES));
+        let notices =
+            components.notice(parts, options).into_iter().chain(coarser).chain(closed.take(MAX_NOTICES));
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
@@ -219,51 +218,6 @@ fn generate_plain(
         return Ok(GeneratedCage { cage, report });
     }
     Err(CageGenError::Unresolved)
-}
-
-/// Components of a model that a cage can enclose one by one.
-struct Apart {
-    /// Number of components that the finest lattice keeps apart.
-    parts: usize,
-    /// Smallest number of voxels tried with which the hull has that many parts.
-    voxels: usize,
-}
-
-/// Finds the components of a model that a cage of `target` vertices can enclose one by one. `separate`: number of parts
-/// of the hull on a lattice. `[first, finest]`: voxels along the longest side of the coarsest and the finest lattice.
-///
-/// # Errors
-/// If `separate` is cancelled.
-fn parts_apart(
-    separate: impl Fn(usize) -> Result<usize, Cancellation>,
-    [first, finest]: [usize; 2],
-    target: usize,
-) -> Result<Apart, Cancellation> {
-    let parts = separate(finest)?;
-    if parts == 1 || parts * MIN_PART_VERTICES > target {
-        return Ok(Apart { parts, voxels: MIN_VOXELS });
-    }
-    let mut voxels = first;
-    while voxels < finest && separate(voxels)? < parts {
-        voxels = (voxels * 5 / 4).min(finest);
-    }
-    Ok(Apart { parts, voxels })
-}
-
-impl Apart {
-    /// Returns a sentence with a remedy if a cage with one part for each component has only `parts` parts.
-    fn notice(&self, parts: u32, options: &CageOptions) -> Option<String> {
-        if !options.per_component || parts as usize >= self.parts {
-            return None;
-        }
-        let remedy = if options.voxels > 0 && (options.voxels as usize) < self.voxels {
-            format!("use {} voxels instead of {}", self.voxels, options.voxels)
-        } else {
-            format!("allow more than {} vertices", options.target)
-        };
-        let has = counted(parts as usize, "closed part", "closed parts");
-        Some(format!("the cage has {has} for {} components; for one each, {remedy}", grouped(self.parts)))
-    }
 }
 
 /// Returns the initial number of voxels along the longest side. It grows with the target, as a cage of few vertices

@@ -353,7 +353,7 @@ fn a_coarse_lattice_joins_no_components_unless_the_cage_has_too_few_vertices() {
     assert_eq!((nine.parts, nine.notices), (9, vec![]));
     let many = make(&balls(5), &each).report;
     assert!(many.parts < 25, "{}", many.parts);
-    let remedy = "for 25 components; for one each, allow more than 80 vertices";
+    let remedy = "for 25 components of the model; for a part each, allow more than 80 vertices";
     assert!(many.notices[0].ends_with(remedy), "{:?}", many.notices);
 }
 
