@@ -20,6 +20,7 @@ import { createWorks } from "./actions/works";
 import type { NamedFile } from "./contract";
 import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
 import { followDocument } from "./document";
+import { commitDraft } from "./draft";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
@@ -125,7 +126,10 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     tour,
     mac,
     /** Runs a command of the shortcut table. */
-    run: (command: Command): void => commands[command](),
+    run(command: Command) {
+      commitDraft();
+      commands[command]();
+    },
     go(step: StepName) {
       if (step !== "cage" && store.get().placing) controls.arm(null);
       if (step !== "model") painting.on(null);

@@ -5,10 +5,12 @@ import { loadPart } from "@cagework/core/session/parts";
 import { createApp } from "./app";
 import type { Session } from "./contract";
 import { watchCrashes } from "./crash";
+import { attachDrafts } from "./draft";
 import { attachBrush } from "./input/brush";
 import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
+import { attachPress } from "./input/press";
 import { keepOffline } from "./offline/keep";
 import { openSession } from "./session";
 import { createStore } from "./signals";
@@ -80,6 +82,8 @@ async function main(): Promise<void> {
     app.view.resized();
     void app.bind.prepareCompare(store.get().scene.compare);
   });
+  attachPress();
+  attachDrafts(window);
   mount({ app, Toasts, Lost: lost.Lost, byId });
   try {
     session = await openSession(stage, { fresh: isFresh(), changed: app.take });

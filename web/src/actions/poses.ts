@@ -104,6 +104,18 @@ export function createPoses(ctx: Context, edit: Edit) {
   };
 
   return {
+    /**
+     * Finds the pose that was at `index` when its row was drawn. Undefined if it was removed since. The press of a
+     * button may change the order or the name before its click arrives, because it commits what was typed.
+     */
+    indexOf({ name, hash }: PoseView, index: number): number | undefined {
+      const { poses } = store.get();
+      const is = (k: number) => poses[k]?.hash === hash;
+      return (
+        [index, ...poses.keys()].find((k) => is(k) && poses[k]?.name === name) ??
+        (is(index) ? index : undefined)
+      );
+    },
     save() {
       if (!store.get().cage) return;
       const moment = store.get().playing && triples(engine().cagePositions());
@@ -119,10 +131,14 @@ export function createPoses(ctx: Context, edit: Edit) {
       edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
       void drawPictures(index);
     },
-    rename(index: number, text: string) {
+    /** Renames a pose. Returns false if the name is empty. */
+    rename(index: number, text: string): boolean {
       const name = text.trim().replace(/\s+/g, " ");
-      if (name === "" || name === store.get().poses[index]?.name) return;
-      edit.apply({ do: "rename_pose", index, name }, T.did.rename);
+      if (name === "") return false;
+      return (
+        name === store.get().poses[index]?.name ||
+        edit.apply({ do: "rename_pose", index, name }, T.did.rename)
+      );
     },
     remove: (index: number) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
     /** Replaces a pose by the current one. */

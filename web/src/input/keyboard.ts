@@ -1,7 +1,11 @@
 /** Keyboard handler: finds the command of a key press in the shortcut table and runs it. */
 
 import type { App } from "../app";
-import { commandOf } from "./shortcuts";
+import { type Command, commandOf, SHORTCUTS } from "./shortcuts";
+
+const FILE_COMMANDS: ReadonlySet<Command> = new Set(
+  SHORTCUTS.filter(({ group }) => group === "file").map(({ command }) => command),
+);
 
 /** Whether the element with the focus handles typed keys itself. */
 function isTyping(target: EventTarget | null): boolean {
@@ -24,9 +28,11 @@ function isControlKey(target: EventTarget | null, key: string): boolean {
 
 export function attachKeyboard(viewport: HTMLElement, app: App): void {
   document.addEventListener("keydown", (event) => {
-    if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
-    const gesture = app.edit.active();
     const mod = event.ctrlKey || event.metaKey;
+    // While the user types, only the commands of files apply: the other keys belong to the field.
+    const typing = isTyping(event.target);
+    if (event.defaultPrevented || event.isComposing || (typing && !mod)) return;
+    const gesture = app.edit.active();
     // During a gesture, Enter ends the gesture even if a button has the focus.
     if (!gesture && !mod && isControlKey(event.target, event.key)) return;
     if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
@@ -45,7 +51,7 @@ export function attachKeyboard(viewport: HTMLElement, app: App): void {
       return;
     }
     const command = commandOf(event, { gesture, rest: editingRest, tour: tour !== null });
-    if (!command) return;
+    if (!command || (typing && !FILE_COMMANDS.has(command))) return;
     // Tab switches between posing and reshaping only if the view got the focus by a click. If the view got it by
     // keyboard, Tab moves the focus.
     if (command === "restMode") {

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { createDraft, type Entry, type NumberRange, numberIn } from "../draft";
 import { percent } from "../format";
 import { type Message, textOf } from "../strings";
 import { Icon, type IconName } from "./icons";
@@ -29,13 +30,27 @@ interface ButtonProps {
   pressed?: boolean;
 }
 
-type PlainProps = Omit<ButtonProps, "label"> & { children?: ComponentChildren };
+type PlainProps = ButtonProps & { children?: ComponentChildren };
 
-function PlainButton({ icon, kind = "", tip, name, pressed, children, ...rest }: PlainProps) {
+function PlainButton(props: PlainProps) {
+  const { label, onClick, icon, kind = "", tip, name, pressed, children, ...rest } = props;
+  /** The button at the press of a pointer. If it is drawn with another label before the release, this is what runs. */
+  const press = useRef<{ label: string; onClick: () => void } | undefined>(undefined);
   return (
     <button
       {...rest}
       type="button"
+      onPointerDown={() => {
+        press.current = { label, onClick };
+      }}
+      onKeyDown={() => {
+        press.current = undefined;
+      }}
+      onClick={() => {
+        const { current } = press;
+        press.current = undefined;
+        (current && current.label !== label ? current.onClick : onClick)();
+      }}
       class={kind.trim()}
       aria-label={name}
       aria-pressed={pressed}
@@ -50,7 +65,7 @@ function PlainButton({ icon, kind = "", tip, name, pressed, children, ...rest }:
 /** Button with text and an optional icon. It is small unless `kind` says otherwise. */
 export function Button({ label, kind = "small", ...rest }: ButtonProps) {
   return (
-    <PlainButton {...rest} kind={`button ${kind}`}>
+    <PlainButton {...rest} label={label} kind={`button ${kind}`}>
       <span>{label}</span>
     </PlainButton>
   );
@@ -64,7 +79,7 @@ interface IconButtonProps extends Omit<ButtonProps, "icon" | "name"> {
 /** Button with only an icon. `label` is its accessible name and, with the shortcut, its tool tip. */
 export function IconButton({ label, shortcut, kind = "", tip = label, ...rest }: IconButtonProps) {
   const whole = shortcut ? `${tip} (${shortcut})` : tip;
-  return <PlainButton {...rest} kind={`icon-button ${kind}`} name={label} tip={whole} />;
+  return <PlainButton {...rest} label={label} kind={`icon-button ${kind}`} name={label} tip={whole} />;
 }
 
 let next = 0;
@@ -227,46 +242,66 @@ export function Slider(props: SliderProps) {
   );
 }
 
-interface NumberInputProps {
+interface TextEntryProps<T> extends Entry<T> {
+  /** Whether long text wraps. */
+  wraps?: boolean;
+  name?: string | undefined;
+  /** Further attributes of the element. */
+  attributes?: Readonly<Record<string, string | number | undefined>>;
+}
+
+/**
+ * The one field for typed text and numbers. It commits on Enter, when it loses the focus, on the steps of a number
+ * field, and before any other action. Escape drops what was typed.
+ */
+export function TextEntry<T>({ text, parse, onCommit, wraps, name, attributes }: TextEntryProps<T>) {
+  const element = useRef<HTMLInputElement & HTMLTextAreaElement>(null);
+  const [draft] = useState(() => createDraft<T>());
+  const [, drawAgain] = useState({});
+  useLayoutEffect(() => {
+    if (!element.current) return;
+    draft.update(element.current, { text, parse, onCommit });
+    element.current.ariaInvalid = String(draft.isMalformed());
+  });
+  useLayoutEffect(() => draft.commit, []);
+  const commit = () => {
+    draft.commit();
+    drawAgain({});
+  };
+  const Element = wraps ? "textarea" : "input";
+  return (
+    <Element
+      {...attributes}
+      ref={element}
+      aria-label={name}
+      onInput={draft.type}
+      onChange={commit}
+      onBlur={commit}
+      onKeyDown={(event: KeyboardEvent) => {
+        const ends = event.key === "Enter" || event.key === "Escape";
+        if (!ends || event.isComposing || event.ctrlKey || event.metaKey) return;
+        event.preventDefault();
+        if (event.key === "Escape") draft.drop();
+        element.current?.blur();
+      }}
+    />
+  );
+}
+
+interface NumberInputProps extends NumberRange {
   id?: string;
   name?: string;
   value: number | string;
-  onChange: (value: number) => void;
-  min?: number;
-  max?: number;
-  step?: number;
+  /** Returns false if the number is refused. */
+  onChange: (value: number) => unknown;
 }
 
-/** Number field. Calls `onChange` when the user presses Enter or leaves the field, if the number is valid. */
-export function NumberInput({ name, value, onChange, ...rest }: NumberInputProps) {
-  const input = useRef<HTMLInputElement>(null);
-  /** Whether the user has typed something that is not committed. The field is not overwritten then. */
-  const isTyping = useRef(false);
-  useLayoutEffect(() => {
-    if (input.current && !isTyping.current) input.current.value = String(value);
-  }, [value]);
+/** Number field. `onChange` gets numbers of the range. Other text stays in the field, marked as invalid. */
+export function NumberInput({ name, value, onChange, id, step, min, max }: NumberInputProps) {
+  const parse = (text: string) => numberIn(text, { min, max, step });
+  const attributes = { id, type: "number", inputMode: "decimal", step: step ?? "any", min, max };
   return (
-    <input
-      step="any"
-      {...rest}
-      ref={input}
-      type="number"
-      aria-label={name}
-      inputMode="decimal"
-      onInput={() => {
-        isTyping.current = true;
-      }}
-      onBlur={() => {
-        isTyping.current = false;
-      }}
-      onChange={(event) => {
-        isTyping.current = false;
-        const { currentTarget: field } = event;
-        const isValid = field.value !== "" && field.validity.valid;
-        field.setAttribute("aria-invalid", String(!isValid));
-        if (isValid) onChange(field.valueAsNumber);
-      }}
-    />
+    <TextEntry name={name} text={String(value)} parse={parse} onCommit={onChange} attributes={attributes} />
   );
 }
 

@@ -20,6 +20,7 @@ import {
   Select,
   SHARES,
   Slider,
+  TextEntry,
   Toggle,
 } from "./controls";
 import { Icon } from "./icons";
@@ -258,6 +259,8 @@ function Timing({ app }: { app: App }) {
   );
 }
 
+const NAME_FIELD = { class: "pose-name", rows: 1, maxLength: 60 };
+
 interface PoseRowProps {
   app: App;
   pose: PoseView;
@@ -275,11 +278,10 @@ function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: Po
   const { playingPose, pictures } = app.store.get();
   const { name, seconds, interpolation, hash } = pose;
   const picture = pictures[hash];
-  /**
-   * Number of rejected inputs in the time field. It is the key of the field, so that a new field with the pose's time
-   * replaces the rejected text.
-   */
-  const [refused, setRefused] = useState(0);
+  const onPose = (act: (index: number) => void) => () => {
+    const place = app.poses.indexOf(pose, index);
+    if (place !== undefined) act(place);
+  };
   return (
     <li
       class={isOver ? "card pose over" : "card pose"}
@@ -306,32 +308,23 @@ function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: Po
           <Icon name="grip" />
         </button>
         {/* Unlike an input, a textarea wraps a long name. */}
-        <textarea
-          class="pose-name"
-          rows={1}
-          value={name}
-          aria-label={T.pose.nameOf(name)}
-          maxLength={60}
-          onKeyDown={(event) => {
-            if (event.key !== "Enter") return;
-            event.preventDefault();
-            event.currentTarget.blur();
-          }}
-          onChange={(event) => {
-            app.poses.rename(index, event.currentTarget.value);
-            // An empty name is rejected.
-            event.currentTarget.value = app.store.get().poses[index]?.name ?? "";
-          }}
+        <TextEntry
+          wraps
+          name={T.pose.nameOf(name)}
+          text={name}
+          parse={String}
+          onCommit={(text) => app.poses.rename(index, text)}
+          attributes={NAME_FIELD}
         />
         <Button
           label={T.pose.show}
-          onClick={() => app.poses.apply(index)}
+          onClick={onPose(app.poses.apply)}
           tip={T.pose.showTip(name, app.key("undo"))}
         />
         <IconButton
           icon="trash"
           label={T.pose.delete(name)}
-          onClick={() => app.poses.remove(index)}
+          onClick={onPose(app.poses.remove)}
           kind="small"
         />
       </div>
@@ -339,21 +332,18 @@ function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: Po
         {picture && <img class="pose-picture" src={picture} alt="" width="64" height="48" />}
         <div class="pose-time">
           <NumberInput
-            key={refused}
             name={T.pose.timeOf(name)}
             value={thousandths(seconds)}
             min={0}
-            onChange={(value) => {
-              if (!app.poses.time(index, value)) setRefused(refused + 1);
-            }}
+            onChange={(value) => app.poses.time(index, value)}
           />
           <span aria-hidden="true">s</span>
         </div>
-        <Button label={T.pose.update} name={T.pose.updateOf(name)} onClick={() => app.poses.update(index)} />
+        <Button label={T.pose.update} name={T.pose.updateOf(name)} onClick={onPose(app.poses.update)} />
         <IconButton
           icon="copy"
           label={T.pose.duplicate(name)}
-          onClick={() => app.poses.duplicate(index)}
+          onClick={onPose(app.poses.duplicate)}
           kind="small"
         />
       </div>

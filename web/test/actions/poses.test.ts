@@ -57,6 +57,17 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 11]);
 });
 
+it("a button of a row acts on its pose although the press has sorted or renamed the poses", () => {
+  const { poses, show } = page();
+  const pose = (name: string, hash: number) =>
+    ({ name, fits: true, seconds: 1, interpolation: null, hash }) as const;
+  const [a, b, same] = [pose("a", 7), pose("b", 8), pose("c", 8)];
+  show({ poses: [b, a, same] });
+  expect([poses.indexOf(a, 0), poses.indexOf(b, 0), poses.indexOf(same, 2)]).toEqual([1, 0, 2]);
+  show({ poses: [pose("renamed", 7), b] });
+  expect([poses.indexOf(a, 0), poses.indexOf(a, 1)]).toEqual([0, undefined]);
+});
+
 it("every pose that fits the cage gets a picture, once, unless the list changes while it is drawn", async () => {
   const { poses, asked, store, show } = page();
   const pose = (hash: number, fits = true) =>
