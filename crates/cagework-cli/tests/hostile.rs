@@ -13,12 +13,12 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Limit on the processor time of a command, seconds, long enough for a build without optimisation. Unlike the time on
-/// the clock, it depends little on what else the machine does.
-const MAX_CPU_SECONDS: u32 = 10;
+/// Processor time after which a command that does not end is stopped, seconds. On an idle machine all end within 10 s,
+/// but processor time doubles where two threads share a core. The table that the test writes has the times.
+const MAX_CPU_SECONDS: u32 = 60;
 
-/// Time limit of a command that waits without computing, seconds.
-const MAX_SECONDS: u32 = 60;
+/// Time after which a command that waits without computing is stopped, seconds.
+const MAX_SECONDS: u32 = 600;
 
 /// Memory limit of a command, MB.
 const MAX_MEGABYTES: u64 = 1000;

@@ -1,68 +1,63 @@
 """Long work releases the interpreter lock, and is cancelled by Ctrl-C."""
 
+import _thread
 import signal
 import subprocess
 import sys
 import threading
-import time
 
 import cagework as cw
 import numpy as np
 import pytest
 from support import box
 
-# A bind of 193 batches of columns, between which cancellation is polled.
+# A bind of 193 batches of columns, between which cancellation is polled. It takes 90 s on an idle machine, so a signal
+# that arrives when it reports its first progress arrives before its end. The shell that runs the tests may have set
+# SIGINT to be ignored, which child processes inherit.
 SCRIPT = """
-import sys
+import signal, sys
 sys.path.insert(0, {tests!r})
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import cagework as cw, numpy as np
 from support import box
 cage = cw.Cage(*box(5))
 points = np.zeros((1, 3))
-cw.bind(points, cage, grid=8)
-print("binding", flush=True)
+said = []
+def progress(fraction):
+    if not said:
+        said.append(fraction)
+        print("binding", flush=True)
 try:
-    cw.bind(points, cage, grid=96)
+    cw.bind(points, cage, grid=96, progress=progress)
     print("bound")
 except KeyboardInterrupt:
     print("interrupted")
 print(cw.bind(points, cage, grid=8)[0].shape)
 """
-# Longest time from Ctrl-C to the end of the process, seconds. A batch takes 0.1 s and the whole bind 90 s on an idle
-# machine.
-TIMEOUT = 20.0
 
 
 def test_ctrl_c_cancels_a_bind_and_python_continues():
     script = SCRIPT.format(tests=__file__.rpartition("/")[0])
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout.readline() == "binding\n"
-        time.sleep(0.5)
         child.send_signal(signal.SIGINT)
-        sent = time.monotonic()
         assert child.stdout.read().split("\n") == ["interrupted", "(1, 1538)", ""]
-        assert child.wait() == 0 and time.monotonic() - sent < TIMEOUT
+        assert child.wait() == 0
 
 
 def test_another_thread_runs_while_a_bind_does():
-    ticks, ended = [], threading.Event()
+    # The other thread interrupts the bind. If the bind held the interpreter lock, it would end first.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    cage = cw.Cage(*box(5))
+    interrupting = threading.Thread(target=_thread.interrupt_main)
 
-    def count():
-        while not ended.is_set():
-            ticks.append(time.perf_counter())
-            time.sleep(0.001)
+    def progress(_fraction):
+        if not interrupting.ident:
+            interrupting.start()
 
-    cage = cw.Cage(*box(3))
-    counting = threading.Thread(target=count)
-    counting.start()
-    began = time.perf_counter()
-    cw.bind(np.zeros((1, 3)), cage, grid=64)
-    took = time.perf_counter() - began
-    ended.set()
-    counting.join()
-    during = [began, *(t for t in ticks if began < t < began + took), began + took]
-    # If the bind held the interpreter lock, the other thread could not count while the bind runs.
-    assert max(np.diff(during)) < took / 2 and len(during) > 10
+    with pytest.raises(KeyboardInterrupt):
+        cw.bind(np.zeros((1, 3)), cage, grid=96, progress=progress)
+    interrupting.join()
 
 
 def test_progress_reports_fractions_and_cancels_by_raising():

