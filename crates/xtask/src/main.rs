@@ -8,6 +8,7 @@ mod deny;
 mod licences;
 mod npm;
 mod package;
+mod parts;
 mod prose;
 mod python;
 mod site;
@@ -28,7 +29,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   check-scripts  the part of `check` that is about TypeScript
   test-beside    the part of `test` that runs beside the Rust tests: TypeScript, Firefox, the packages, the page's build
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
-  python         the Python package only, built with the Rust tests and tested against the command
+  python [ARGS]  the Python package only, built with the Rust tests and tested against the command (ARGS for pytest)
   blender        the Blender extension: built, and tested in Blender as a Python package (needs Python 3.11)
   notebooks      the notebook widget in JupyterLab, and the example notebooks (600 MB to download)
   notebook-wheel the notebook widget's wheel, into target/notebook
@@ -37,6 +38,9 @@ const USAGE: &str = "usage: cargo xtask TASK
   npm-pack       the npm package, packed into target/npm
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/package/src/pkg
   page           build the page only
+  scripts [ARGS] the TypeScript tests that need no browser (ARGS for Vitest)
+  firefox        build the page and test it in Firefox
+  exports        exported files through the Khronos validator and three.js
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
   pictures       make the pictures of the samples that the page shows
   demo [ARGS]    build the release `cagework` and run `cagework demo ARGS` on the built-in sample";
@@ -56,8 +60,11 @@ fn main() -> ExitCode {
         ["check"] => tasks::check(),
         ["check-and-build"] => tasks::check_and_build(),
         ["test-beside"] => tasks::test_beside(),
+        ["scripts", rest @ ..] => site::test_scripts(rest),
+        ["firefox"] => site::build().and_then(|()| site::test_firefox()),
+        ["exports"] => tasks::build_tests().and_then(|()| tasks::validate_exports()),
         ["check-scripts"] => tasks::check_scripts(),
-        ["python"] => tasks::build_tests().and_then(|()| python::test()),
+        ["python", rest @ ..] => tasks::build_tests().and_then(|()| python::test(rest)),
         ["blender"] => python::test_blender(),
         ["notebooks"] => python::test_notebooks(),
         ["notebook-wheel"] => python::notebook_wheel().map(|wheel| println!("{wheel}")),

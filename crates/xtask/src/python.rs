@@ -16,15 +16,17 @@ const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
 const INSTALL: [&str; 6] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"];
 
 /// Tests the package. Needs the command and the native module as [`crate::tasks::build_tests`] builds them. maturin
-/// would build the module with other features, which compiles 43 crates again: four minutes of processor time.
+/// would build the module with other features, which compiles 43 crates again: four minutes of processor time. `args`
+/// are passed to pytest.
 ///
 /// # Errors
 /// When a step fails.
-pub(crate) fn test() -> Result<(), String> {
+pub(crate) fn test(args: &[&str]) -> Result<(), String> {
     let python = environment()?;
     install_built(&python)?;
     let command = path(target_folder()?.join("debug/cagework"))?;
-    run(&python, &["-m", "pytest", &format!("{PACKAGE}/tests")], &[("CAGEWORK_COMMAND", &command)])?;
+    let tests = format!("{PACKAGE}/tests");
+    run(&python, &[&["-m", "pytest", &tests], args].concat(), &[("CAGEWORK_COMMAND", &command)])?;
     // The types are also checked by mypy, which one of the tests above runs.
     npm::install()?;
     npm::exec(&["pyright", "--pythonpath", &python, &format!("{PACKAGE}/tests/typed.py")])

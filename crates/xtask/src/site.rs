@@ -45,13 +45,13 @@ pub(crate) fn start(args: &[&str]) -> Result<(), String> {
     exec(&[&["vite", "preview", "web", "--config", "web/vite.config.ts"], args].concat())
 }
 
-/// Tests TypeScript modules without a browser.
+/// Tests TypeScript modules without a browser; `args` are passed to Vitest.
 ///
 /// # Errors
 /// When a test fails.
-pub(crate) fn test_scripts() -> Result<(), String> {
+pub(crate) fn test_scripts(args: &[&str]) -> Result<(), String> {
     npm::install()?;
-    exec(&["vitest", "run", "--root", "web"])
+    exec(&[&["vitest", "run", "--root", "web"], args].concat())
 }
 
 /// Builds the page and tests it in a browser; `args` are passed to Playwright.

@@ -1,9 +1,11 @@
 //! The tasks of the repository. Each task installs what it needs.
 
 use std::process::Command;
+use std::time::Instant;
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
+use crate::parts::{self, part};
 use crate::{arrows, deny, licences, package, prose, python, site, wasm};
 
 /// Builds the `cagework` command in release mode and runs it on its built-in sample.
@@ -24,19 +26,31 @@ pub(crate) fn build() -> Result<(), String> {
 /// other features.
 const TEST_PACKAGES: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
-/// Runs the Rust, Python and TypeScript tests, and the tests of the page in browsers.
+/// Runs the Rust, Python and TypeScript tests, and the tests of the page in browsers. Prints a table of them.
 pub(crate) fn test() -> Result<(), String> {
+    let began = Instant::now();
+    parts::begin()?;
     npm::install()?;
-    build_tests()?;
+    let outcome = test_parts();
+    parts::end(began.elapsed()).and(outcome)
+}
+
+fn test_parts() -> Result<(), String> {
+    if !part("build of the Rust tests", "cargo test --no-run", build_tests)? {
+        return Ok(());
+    }
     // Run two tasks in parallel, because most Rust tests leave one of two cores idle.
     beside("test-beside", || {
-        run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
-        run("cargo", &[&["test", "--locked"], &TEST_PACKAGES[..]].concat(), &[])?;
+        let own = ["test", "--locked", "--package", "xtask"];
+        part("tasks of the repository", &format!("cargo {}", own.join(" ")), || run("cargo", &own, &[]))?;
+        let rust = [&["test", "--locked", "--no-fail-fast"], &TEST_PACKAGES[..]].concat();
+        part("Rust", &format!("cargo {}", rust.join(" ")), || run("cargo", &rust, &[]))?;
         // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
-        fuzz(&["--minutes", "0.1", "--seed", "1"])?;
-        validate_exports()
+        let fixed = ["--minutes", "0.1", "--seed", "1"];
+        part("damaged files", &format!("cargo xtask fuzz {}", fixed.join(" ")), || fuzz(&fixed))?;
+        part("exported files", "cargo xtask exports", validate_exports).map(drop)
     })?;
-    site::test_built_page(&[])
+    part("page in Chromium", "cargo xtask page-test --last-failed", || site::test_built_page(&[])).map(drop)
 }
 
 /// Builds the Rust tests, what they run, and the native module of the Python package.
@@ -61,12 +75,17 @@ pub(crate) fn check_and_build() -> Result<(), String> {
 }
 
 /// Runs the part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
+///
+/// # Errors
+/// When the page cannot be built. Failed tests are only noted, see [`part`].
 pub(crate) fn test_beside() -> Result<(), String> {
-    python::test()?;
-    site::test_scripts()?;
-    site::build()?;
-    site::test_firefox()?;
-    package::test()
+    part("Python package", "cargo xtask python --last-failed", || python::test(&[]))?;
+    part("TypeScript", "cargo xtask scripts", || site::test_scripts(&[]))?;
+    if !part("build of the page", "cargo xtask page", site::build)? {
+        return Err("there is no page to test".to_owned());
+    }
+    part("page in Firefox", "cargo xtask firefox", site::test_firefox)?;
+    part("npm package", "cargo xtask npm", package::test).map(drop)
 }
 
 /// Runs all file readers on damaged files. The readers are built with overflow checks and debug assertions.
@@ -131,7 +150,7 @@ fn one_version() -> Result<(), String> {
 
 /// Checks that exported GLBs pass the Khronos glTF validator and play in three.js as in Cagework, and that three.js
 /// reads captures.
-fn validate_exports() -> Result<(), String> {
+pub(crate) fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
