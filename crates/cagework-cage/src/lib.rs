@@ -5,6 +5,7 @@
 pub mod check;
 pub mod generate;
 pub mod samples;
+pub mod skeleton;
 
 pub use generate::{CageOptions, GeneratedCage};
 

@@ -11,7 +11,9 @@ use glam::{Vec2, Vec3};
 
 use crate::controls::RestCage;
 use crate::document::{Document, Key, NamedPose, Transition, cage_id};
-use crate::edit::{Constraint, Element, Gesture, GestureKind, Pull, Selection, SharedPull, Topology};
+use crate::edit::{
+    Constraint, Element, Gesture, GestureKind, Pull, SelectMode, Selection, SharedPull, Topology,
+};
 use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
@@ -282,6 +284,15 @@ impl Editor {
     /// Extends the selection to whole connected components.
     pub fn select_linked(&mut self) {
         self.selection.linked(&self.topology);
+    }
+
+    /// Selects the ring through vertices of the cage, see [`Topology::ring`]. Returns whether there is one.
+    pub fn select_ring(&mut self, through: &[u32], mode: SelectMode) -> bool {
+        let ring = self.topology.ring(through, &self.document.cage.mesh.positions);
+        ring.is_some_and(|ring| {
+            self.selection.change(&ring, mode);
+            true
+        })
     }
 
     /// Identifies the inputs of a bind.

@@ -281,6 +281,15 @@ export function attachPointer(stage: Stage, app: App): void {
   };
   viewport.addEventListener("pointerup", (event) => up(event, true));
   viewport.addEventListener("pointercancel", (event) => up(event, false));
+  // The clicks before have selected a vertex or an edge.
+  viewport.addEventListener("dblclick", (event) => {
+    const { cage, scene, placing, painting: painted, gesture } = store.get();
+    if (!ready() || !cage || !scene.cage || placing || painted || gesture !== null) return;
+    const at = place(event);
+    const vertices = engine().pick(at.x, at.y, MOUSE_RADIUS);
+    const mode = event.shiftKey || store.get().additive ? "add" : "replace";
+    if (vertices.length > 0) engine().selectRing(vertices, mode);
+  });
   viewport.addEventListener("pointerleave", () => {
     if (drag || !store.get().cage) return;
     engine().hover(new Uint32Array());

@@ -7,6 +7,7 @@
 mod gesture;
 mod pick;
 mod pull;
+mod ring;
 mod selection;
 
 pub use gesture::{Constraint, Gesture, GestureKind, GestureView};

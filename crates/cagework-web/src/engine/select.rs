@@ -98,6 +98,21 @@ impl Engine {
         self.change_selection(|state| state.editor.select_linked());
     }
 
+    /// Selects the ring of edges through cage vertices, as around an arm. Returns false if there is none.
+    ///
+    /// # Errors
+    /// If the mode is unknown.
+    #[wasm_bindgen(js_name = selectRing)]
+    pub fn select_ring(
+        &self,
+        through: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
+    ) -> Answer<bool> {
+        let (mode, mut is_found) = (decode(mode)?, false);
+        self.change_selection(|state| is_found = state.editor.select_ring(through, mode));
+        Ok(is_found)
+    }
+
     /// Indices of the selected vertices, ascending.
     pub fn selection(&self) -> Vec<u32> {
         self.read(|state| state.editor.selection.vertices())

@@ -78,6 +78,7 @@ export const sheetWords = {
     ["Right, middle or Shift+drag", "Move the view"],
     ["Wheel, pinch", "Zoom at the pointer"],
     ["Shift+click", "Add to the selection, or remove from it"],
+    ["Double click on a handle or edge", "Select the ring around the limb"],
     ["Ctrl+drag the background", "Select with a box"],
     ["Alt+left, middle, right", "Turn, move, zoom as in Maya"],
     ["One finger; two fingers", "Turn the view or drag a handle; move and zoom"],
