@@ -1,7 +1,7 @@
 /** Binds run in the background: during a bind, the page draws frames, shows progress, and can cancel the bind. */
 
 import { BIND_DEFAULTS } from "../src/defaults";
-import { bound, dropBox, expect, open, shoot, test } from "./support";
+import { bound, dropBox, expect, hears, open, shoot, test } from "./support";
 
 test("frames are drawn during a bind at g = 64", async ({ page }) => {
   // Drawing and the bind share one software GPU: in a small window, drawing takes little of its time.
@@ -46,12 +46,12 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
   });
 
   await test.step("a cancelled bind keeps the previous one and marks the new settings", async () => {
-    await grid("128").check({ force: true });
+    await grid("256").check({ force: true });
     await page.keyboard.press("Control+Enter");
     await expect(page.locator(".plot polyline"), "the chart shows this bind only").toHaveCount(1);
     await page.getByRole("button", { name: "Cancel" }).click();
-    await expect(page.getByText("Cancelled. The previous bind is still active.")).toBeVisible();
-    await expect(grid("128")).toBeChecked();
+    await hears(page, "Cancelled. The previous bind is still active.");
+    await expect(grid("256")).toBeChecked();
     await expect(page.getByText("Not applied yet: bind again to use these settings.")).toBeVisible();
     await bound(page);
   });

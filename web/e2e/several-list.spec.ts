@@ -2,7 +2,7 @@
 
 import { press, rows, step, undo } from "./dressed";
 import { box } from "./models";
-import { bound, carry, expect, open, shoot, test } from "./support";
+import { bound, carry, expect, hears, open, shoot, test } from "./support";
 
 test("models are added to a sample, and reported when they reach outside its cage", async ({ page }) => {
   await open(page);
@@ -24,7 +24,7 @@ test("models are added to a sample, and reported when they reach outside its cag
   await expect(page.getByRole("alert").getByText("notes.obj could not be opened")).toBeVisible();
   await expect(page.getByRole("button", { name: "Add another file" })).toBeVisible();
   await expect(rows(page)).toHaveCount(3);
-  await expect(page.getByText(/The added model reaches outside/)).toBeVisible();
+  await hears(page, /The added model reaches outside/);
   await shoot(page, "several-outside");
   await press(page, "Make a cage around all");
   await bound(page);

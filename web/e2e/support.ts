@@ -10,6 +10,8 @@ declare global {
   var cagework: Session | undefined;
   /** Set by tests that lose the GPU: a promise that resolves when the page is notified of the loss. */
   var wasLost: Promise<unknown> | undefined;
+  /** Texts of all messages that the page has shown, in order. */
+  var heard: string[] | undefined;
 }
 
 /** Folder of the screenshots that `SHARP=1` saves for inspection. */
@@ -26,6 +28,7 @@ export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }
     if (!serviceWorker) {
       await context.addInitScript(() => void Reflect.deleteProperty(Navigator.prototype, "serviceWorker"));
     }
+    await context.addInitScript(listen);
     await use(context);
   },
   complaints: [
@@ -49,6 +52,33 @@ export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }
 });
 
 export { expect };
+
+/** Records messages, because they disappear after a few seconds. Runs in the page. */
+function listen(): void {
+  const heard: string[] = [];
+  globalThis.heard = heard;
+  const take = (node: Node) => {
+    if (node instanceof Element && node.matches(".toast")) heard.push(node.textContent ?? "");
+  };
+  const observer = new MutationObserver((changes) => {
+    for (const { addedNodes } of changes) for (const node of addedNodes) take(node);
+  });
+  observer.observe(document, { childList: true, subtree: true });
+}
+
+/** Waits until the page has shown a message since it was loaded, or since the last call of this function. */
+export async function hears(page: Page, text: RegExp | string): Promise<void> {
+  await page.waitForFunction(
+    ([source, flags]) => {
+      const k = globalThis.heard?.findIndex((message) => new RegExp(source, flags).test(message)) ?? -1;
+      if (k >= 0) globalThis.heard?.splice(0, k + 1);
+      return k >= 0;
+    },
+    typeof text === "string"
+      ? ([text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"), ""] as const)
+      : ([text.source, text.flags] as const),
+  );
+}
 
 /** Opens the page and waits until a model is bound. */
 export async function open(page: Page, address = "./"): Promise<void> {
