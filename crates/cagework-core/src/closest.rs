@@ -1,9 +1,11 @@
-//! Closest point on a cage.
+//! Closest points on cages, and distances from models.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
+use crate::inpaint::tree::TriangleTree;
+use crate::mesh::TriMesh;
 
 /// A point of a cage's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,5 +64,27 @@ impl<'a> FaceBoxes<'a> {
                 }
             }
         }
+    }
+}
+
+/// Computes the distance of each point from the closest triangle of a mesh, object units; infinite without triangles.
+/// `[n_points]`
+#[must_use]
+pub fn distances(points: &[Vec3], mesh: &TriMesh) -> Vec<f64> {
+    let tree = TriangleTree::new(mesh);
+    points.iter().map(|&p| tree.closest(p).map_or(f64::INFINITY, |hit| hit.distance)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_from_a_triangle_are_those_of_its_plane_and_edges() {
+        let positions = vec![Vec3::ZERO, 2.0 * Vec3::X, 2.0 * Vec3::Y];
+        let mesh = TriMesh { positions, triangles: vec![[0, 1, 2]] };
+        let points = [Vec3::new(0.5, 0.5, 3.0), Vec3::new(-3.0, 1.0, 4.0)];
+        assert_eq!(distances(&points, &mesh), [3.0, 5.0]);
+        assert_eq!(distances(&points, &TriMesh::default()), [f64::INFINITY; 2]);
     }
 }

@@ -7,7 +7,7 @@ mod columns;
 
 use glam::{DVec3, Vec3};
 
-use self::columns::Columns;
+pub use self::columns::Columns;
 use crate::cage::{CAGE_TOLERANCE, Cage};
 use crate::closest::FaceBoxes;
 use crate::geometry::winding_number;
@@ -15,7 +15,7 @@ use crate::mesh::Bounds;
 
 /// Winding number above which a point is inside. Off the surface, winding numbers are integers; on it, they lie between
 /// the integers of both sides.
-const MIN_INSIDE_WINDING: f64 = 0.5;
+pub const MIN_INSIDE_WINDING: f64 = 0.5;
 
 /// Winding numbers of points with respect to a cage; 1 for points on its surface.
 #[derive(Clone, Debug)]
@@ -32,15 +32,12 @@ impl Enclosure {
         let corners: Vec<[DVec3; 3]> =
             (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t)).collect();
         let columns = Columns::new(&corners);
-        let winding = |p: DVec3| {
-            columns.winding_number(p).unwrap_or_else(|| winding_number(p, corners.iter().copied()))
-        };
         let (faces, reach) = (FaceBoxes::new(cage), CAGE_TOLERANCE * f64::from(cage.diagonal()));
         let bounds = cage.bounds();
         let [low, high] = [bounds.min.as_dvec3() - reach, bounds.max.as_dvec3() + reach];
         let is_on_cage = |p: DVec3| p.clamp(low, high) == p && faces.find(p).distance <= reach;
         let inside_or_on = |p: DVec3| {
-            let winding = winding(p);
+            let winding = columns.winding_number(p);
             if winding <= MIN_INSIDE_WINDING && is_on_cage(p) { 1.0 } else { winding }
         };
         let winding = points.iter().map(|p| inside_or_on(p.as_dvec3())).collect();
@@ -125,7 +122,7 @@ mod tests {
             let around = cage.positions().iter().flat_map(|p| [-0.4, 0.0, 0.4].map(|z| *p + z * Vec3::Z));
             for p in points().into_iter().chain(around) {
                 let expected = winding_number(p.as_dvec3(), triangles.iter().copied());
-                match columns.winding_number(p.as_dvec3()) {
+                match columns.counted(p.as_dvec3()) {
                     Some(actual) => {
                         assert!((actual - expected).abs() < ROUNDING, "{p}: {actual}, {expected}");
                     }

@@ -10,7 +10,7 @@
 //! faces need no treatment. The inner side of a thick cloth, which faces the body, takes the values of the outer side.
 
 mod side;
-mod tree;
+pub(crate) mod tree;
 
 use glam::Vec3;
 use serde::Serialize;

@@ -2,10 +2,11 @@
 //!
 //! The winding number is the number of crossings at which the ray leaves the closed surface minus those at which it
 //! enters. Faces are sorted into columns, so that each ray is tested against few of them. If rounding could matter,
-//! because the ray passes near an edge or the point lies near a face, callers use
-//! [`winding_number`](crate::geometry::winding_number) instead.
+//! because the ray passes near an edge or the point lies near a face, the angles of all triangles are summed instead.
 
 use glam::{DVec2, DVec3};
+
+use crate::geometry::winding_number;
 
 /// Tolerance of lengths, as a fraction of the surface's extent (of areas: of the square of the extent): 1e7 times f64
 /// rounding.
@@ -15,7 +16,8 @@ const TOLERANCE: f64 = 1e-9;
 const MAX_COLUMNS: f64 = 64.0;
 
 /// Faces of a closed surface, sorted into columns along z.
-pub(super) struct Columns<'a> {
+#[derive(Clone, Debug)]
+pub struct Columns<'a> {
     triangles: &'a [[DVec3; 3]],
     /// Corner of the first column in x and y, object units.
     low: DVec2,
@@ -28,7 +30,9 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    pub(super) fn new(triangles: &'a [[DVec3; 3]]) -> Self {
+    /// Sorts the triangles of a closed surface, counter-clockwise seen from outside.
+    #[must_use]
+    pub fn new(triangles: &'a [[DVec3; 3]]) -> Self {
         let corners = || triangles.iter().flatten().map(|p| p.truncate());
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         let high = corners().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -63,8 +67,15 @@ impl<'a> Columns<'a> {
         ((p - self.low) * self.per_unit).clamp(DVec2::ZERO, DVec2::splat(last)).to_array().map(|x| x as usize)
     }
 
-    /// Computes the winding number of a point; `None` if rounding could matter.
-    pub(super) fn winding_number(&self, point: DVec3) -> Option<f64> {
+    /// Computes the winding number of a point, as [`crate::geometry::winding_number`] does.
+    #[must_use]
+    pub fn winding_number(&self, point: DVec3) -> f64 {
+        let summed = || winding_number(point, self.triangles.iter().copied());
+        self.counted(point).unwrap_or_else(summed)
+    }
+
+    /// Counts the crossings above a point; `None` if rounding could matter.
+    pub(super) fn counted(&self, point: DVec3) -> Option<f64> {
         let p = point.truncate();
         let [x, y] = self.column(p);
         let mut leaves = 0;

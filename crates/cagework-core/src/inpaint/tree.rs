@@ -8,7 +8,7 @@ use crate::mesh::TriMesh;
 /// Largest number of triangles of a leaf.
 const LEAF: usize = 4;
 
-pub(super) struct TriangleTree<'a> {
+pub(crate) struct TriangleTree<'a> {
     mesh: &'a TriMesh,
     /// Triangles. Each inner node splits its range in the middle.
     order: Vec<u32>,
@@ -18,16 +18,16 @@ pub(super) struct TriangleTree<'a> {
 
 /// The closest point on a mesh.
 #[derive(Clone, Copy)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     pub(super) corners: [u32; 3],
     pub(super) triangle: u32,
     /// Barycentric coordinates.
     pub(super) shares: [f64; 3],
-    pub(super) distance: f64,
+    pub(crate) distance: f64,
 }
 
 impl<'a> TriangleTree<'a> {
-    pub(super) fn new(mesh: &'a TriMesh) -> Self {
+    pub(crate) fn new(mesh: &'a TriMesh) -> Self {
         let mut order: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         let mut tree = Self { mesh, order: Vec::new(), boxes: Vec::new() };
         tree.split(&mut order, 0);
@@ -56,7 +56,7 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// Closest point to `point`; `None` without triangles.
-    pub(super) fn closest(&self, point: Vec3) -> Option<Hit> {
+    pub(crate) fn closest(&self, point: Vec3) -> Option<Hit> {
         let mut best = None;
         self.search((&self.order, 0), point.as_dvec3(), &mut best);
         best
