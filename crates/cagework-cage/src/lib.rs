@@ -6,6 +6,7 @@ pub mod check;
 pub mod generate;
 pub mod samples;
 pub mod skeleton;
+pub mod sleeves;
 
 pub use generate::{CageOptions, GeneratedCage};
 

@@ -20,7 +20,7 @@ const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
 /// Smallest allowed cosine between the normals of neighbouring triangles: folds of up to 120 degrees. Deforming a cage
 /// with a sharper fold would turn the model inside out there.
-pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
+pub(crate) const MIN_FOLD_COSINE: f64 = -0.5;
 
 /// A solid that the surface must not meet.
 #[derive(Debug)]

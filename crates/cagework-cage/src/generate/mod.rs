@@ -41,6 +41,7 @@ use collapse::Collapser;
 use components::Components;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
+pub(crate) use guarded::MIN_FOLD_COSINE;
 use lattice::{Lattice, MARGIN_VOXELS};
 pub use options::{
     BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS,
