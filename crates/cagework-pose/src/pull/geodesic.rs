@@ -5,9 +5,9 @@ use std::collections::BinaryHeap;
 
 use glam::Vec3;
 
-use super::nearest::KdTree;
 use cagework_core::disjoint::DisjointSets;
 use cagework_core::mesh::weld;
+use cagework_core::nearest::KdTree;
 
 /// Lower limit on the lengths of the graph's edges, including bridges, as a fraction of the model's size.
 const MIN_BRIDGE_LENGTH: f32 = 1e-9;

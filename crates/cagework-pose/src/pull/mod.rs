@@ -26,7 +26,6 @@ mod fit;
 mod frame;
 mod geodesic;
 mod grip;
-mod nearest;
 mod samples;
 #[cfg(test)]
 mod tests;

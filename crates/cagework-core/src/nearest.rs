@@ -3,21 +3,24 @@
 use glam::Vec3;
 
 /// Implicit k-d tree: the median of each range splits it, along x, y and z cyclically.
-pub(super) struct KdTree<'a> {
+#[derive(Clone, Debug)]
+pub struct KdTree<'a> {
     points: &'a [Vec3],
     order: Vec<u32>,
 }
 
 impl<'a> KdTree<'a> {
     /// Builds the tree of the points with the indices `order`.
-    pub(super) fn new(points: &'a [Vec3], mut order: Vec<u32>) -> Self {
+    #[must_use]
+    pub fn new(points: &'a [Vec3], mut order: Vec<u32>) -> Self {
         sort(points, &mut order, 0);
         Self { points, order }
     }
 
     /// Finds the index and squared distance of the point nearest to `at`. `None` if this distance is not below `limit`
     /// (squared).
-    pub(super) fn find(&self, at: Vec3, limit: f32) -> Option<(u32, f32)> {
+    #[must_use]
+    pub fn find(&self, at: Vec3, limit: f32) -> Option<(u32, f32)> {
         let mut best = (u32::MAX, limit);
         self.search(&self.order, 0, at, &mut best);
         (best.0 != u32::MAX).then_some(best)
