@@ -24,6 +24,7 @@ mod quads;
 mod relax;
 mod shell;
 mod smooth;
+pub(crate) mod solid;
 mod soup;
 mod surface;
 #[cfg(test)]

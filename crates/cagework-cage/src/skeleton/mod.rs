@@ -1,6 +1,22 @@
 //! Skeletons of figures: chains of joints, and the chain of each vertex of the model.
+//!
+//! A skeleton is derived from the joints of a rigged model ([`Skeleton::of_rig`]), or from the voxels of the model
+//! ([`Skeleton::of_surface`]).
 
+mod curve;
+mod mirror;
+mod paths;
+mod rigged;
+#[cfg(test)]
+pub(crate) mod tests;
+mod tree;
+
+use cagework_core::progress::{Cancellation, Progress};
+pub use cagework_core::rig::{Joint, Rig};
 use glam::{DVec3, Vec3};
+use thiserror::Error;
+
+use rigged::MAX_JOINTS;
 
 /// A polyline of joints: the trunk, an arm, a leg or a tail.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +31,7 @@ pub struct Chain {
     pub own_bones: Vec<u32>,
     /// Index of the chain from which this one branches; `None` for the trunk.
     pub parent: Option<usize>,
-    /// Whether all joints lie on the mirror plane.
+    /// Whether all joints lie on the mirror plane; always true for the trunk.
     pub is_midline: bool,
     /// Index of the mirror image in [`Skeleton::chains`].
     pub mirror: Option<usize>,
@@ -30,7 +46,7 @@ pub struct Skeleton {
     pub chains: Vec<Chain>,
     /// Index of the chain of each vertex. `[n_vertices]`
     pub chain_of: Vec<u32>,
-    /// Bone of each vertex: the index of a joint of the rig, or of a segment of a curve skeleton. `[n_vertices]`
+    /// Bone of each vertex: the index of a joint of the rig, or of a chain of a curve skeleton. `[n_vertices]`
     pub bone_of: Vec<u32>,
     /// Axis of the mirror plane: 0 for a plane of constant x.
     pub axis: usize,
@@ -42,24 +58,70 @@ pub struct Skeleton {
     pub is_biped: bool,
 }
 
-/// A joint of a rigged model, at rest.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
-    /// Name in the file.
-    pub name: String,
-    /// Index of the parent joint.
-    pub parent: Option<u32>,
-    /// Position at rest, object units.
-    pub at: Vec3,
+/// Why a model has no skeleton.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SkeletonError {
+    /// The model has no triangles.
+    #[error("the model has no faces, so it has no limbs: use another kind of cage")]
+    NoFaces,
+    /// The model is thinner than one voxel.
+    #[error(
+        "the model is thinner than 1/72 of its longest side, so its limbs are not found: use another kind of cage"
+    )]
+    Flat,
+    /// The triangles cover too many voxels together.
+    #[error("the model has too many large triangles to find its limbs: use another kind of cage")]
+    Soup,
+    /// No joint moves a vertex.
+    #[error("none of the {joints} joints of the rig moves a vertex: remove the rig, or assign weights")]
+    NoWeights {
+        /// Number of joints of the rig.
+        joints: usize,
+    },
+    /// Too many joints move vertices.
+    #[error(
+        "{joints} joints of the rig move vertices; at most {MAX_JOINTS} are supported: use another kind of cage"
+    )]
+    TooManyJoints {
+        /// Number of joints with vertices at them or below them.
+        joints: usize,
+    },
+    /// The arrays of the rig contradict each other.
+    #[error("the rig is not valid: {0}")]
+    Rig(&'static str),
+    /// Cancelled by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancellation),
 }
 
-/// The joints of a rigged model and their influences on its vertices.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rig {
-    /// All joints.
-    pub joints: Vec<Joint>,
-    /// Start of each vertex's influences in `influences`; the last element is their number. `[n_vertices + 1]`
-    pub first: Vec<u32>,
-    /// Joint and weight of each influence. Rigid vertices have one influence, the joint on which they hang.
-    pub influences: Vec<(u32, f32)>,
+impl Skeleton {
+    /// Derives the skeleton from a rig.
+    ///
+    /// `positions`: vertices of the model at the rest of the rig, object units, `[n_vertices]`. Vertices
+    /// without weights, and those beyond the rig's, such as the ends of morph targets, belong to the joint of the nearest
+    /// vertex with weights.
+    ///
+    /// # Errors
+    /// [`SkeletonError`] if the rig is not valid, no joint moves a vertex, or too many do.
+    pub fn of_rig(positions: &[Vec3], rig: &Rig) -> Result<Self, SkeletonError> {
+        rigged::of_rig(positions, rig)
+    }
+
+    /// Derives the skeleton from the model's voxels: 72 along its longest side.
+    ///
+    /// `positions`: `[n_vertices]`, object units, finite. `triangles`: `[n_triangles]`, any soup with valid indices.
+    ///
+    /// Source: Sato et al. 2000, "TEASAR: tree-structure extraction algorithm for accurate and robust skeletons".
+    /// Changes: steps cost more away from the middle of the local thickness, and the paths of symmetric models are
+    /// mirrored.
+    ///
+    /// # Errors
+    /// [`SkeletonError`] if the model has no faces or is flat, or if `progress` cancels.
+    pub fn of_surface(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Self, SkeletonError> {
+        curve::of_surface(positions, triangles, progress)
+    }
 }
