@@ -93,6 +93,22 @@ impl Model {
         Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.joints()))
     }
 
+    /// Returns the joints at rest with their influences on the vertices: the joints of all skins, or the animated nodes
+    /// and VRM bones of a file without skins. Vertices of rigid parts have one influence, the joint on which they hang.
+    /// `None` if there are no joints. Positions as [`Self::positions`].
+    ///
+    /// # Errors
+    /// [`WriteError`] if the joints or weights cannot be read.
+    pub fn rest_rig(&self) -> Result<Option<cagework_core::rig::Rig>, WriteError> {
+        let Document::Gltf(document) = &self.document else { return Ok(None) };
+        let Some(mut rig) = gltf::rest_rig(document, self.origin)? else { return Ok(None) };
+        let at: Vec<Vec3> = rig.joints.iter().map(|joint| joint.at).collect();
+        for (joint, &at) in rig.joints.iter_mut().zip(&*self.up.turned(&at)) {
+            joint.at = at;
+        }
+        Ok(Some(rig))
+    }
+
     /// Names of unskinned parts attached to joints or animated nodes, such as buckles, eyes and weapons. They
     /// can be kept rigid.
     ///

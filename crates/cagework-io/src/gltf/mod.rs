@@ -62,7 +62,9 @@ pub(crate) use rig::joints_with_vertices;
 pub use rig::{
     Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
 };
-pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm, write_moved, write_targets};
+pub(crate) use rig::{
+    PoseDisplacements, Rig, clips, reshape, rest_rig, skeleton, vrm, write_moved, write_targets,
+};
 pub(crate) use size::MAX_TRIANGLES;
 pub(crate) use splats::{LINEAR as LINEAR_SPLATS, write as write_splats};
 pub(crate) use transfer::write_skinned;

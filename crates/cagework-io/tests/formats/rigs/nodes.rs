@@ -56,6 +56,18 @@ fn wheel() -> Builder {
 }
 
 #[test]
+fn vertices_of_rigid_parts_have_one_influence() {
+    let rig = read(&wheel().glb()).rest_rig().unwrap().unwrap();
+    let joints: Vec<_> =
+        rig.joints.iter().map(|joint| (joint.name.as_str(), joint.parent, joint.at)).collect();
+    assert_eq!(joints, [("wheel", None, vec3(3.0, 0.0, 0.0))]);
+    let n: Vec<u32> = rig.first.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    // The body hangs on no joint.
+    assert_eq!(n, [[0; CUBE.len()], [1; CUBE.len()]].concat());
+    assert!(rig.influences.iter().all(|&influence| influence == (0, 1.0)));
+}
+
+#[test]
 fn wheels_rotate_about_their_moved_axles() {
     let model = read(&wheel().glb());
     let wider = |p: Vec3| vec3(1.2 * (p.x - 1.25) + 1.25, p.y, p.z);

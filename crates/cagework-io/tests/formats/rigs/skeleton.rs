@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_cage::samples;
-use cagework_io::{Joints, Model, ReshapeOptions, write_mesh_glb};
+use cagework_io::{Joints, Model, ReshapeOptions, UpAxis, write_mesh_glb};
 use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::json;
 
@@ -57,6 +57,33 @@ fn joints_without_tracks_follow_the_body() {
         let [_, after, body] = origins((tracks, 0.0), Joints::Follow, f);
         assert_near(&after, &body, ROUNDING_TOLERANCE, "first key, which is the rest pose");
     }
+}
+
+#[test]
+fn joints_at_rest_are_those_of_the_file() {
+    let sample = samples::build("humanoid").unwrap();
+    let own = sample.rig.as_ref().unwrap();
+    let mut model = read(&write_mesh_glb("humanoid", &sample.mesh, &sample.colours, Some(own)).unwrap());
+    let rig = model.rest_rig().unwrap().unwrap();
+    assert_eq!(rig.joints.len(), own.joints.len());
+    for (joint, expected) in rig.joints.iter().zip(&own.joints) {
+        assert_eq!((joint.name.as_str(), joint.parent), (expected.name, expected.parent.map(|p| p as u32)));
+        assert!(joint.at.distance(expected.at) < 1e-5, "{}: {} {}", joint.name, joint.at, expected.at);
+    }
+    assert_eq!(rig.first.len(), model.positions.len() + 1);
+    for (range, expected) in rig.first.windows(2).zip(&own.influences) {
+        let influences = &rig.influences[range[0] as usize..range[1] as usize];
+        let sum = |joint| {
+            let own = influences.iter().filter(|influence| influence.0 == joint);
+            own.map(|influence| influence.1).sum::<f32>()
+        };
+        assert!(expected.iter().all(|&(joint, weight)| (sum(joint) - weight).abs() < 0.01));
+    }
+    // The joints turn with the positions.
+    model.set_up(UpAxis::Z);
+    let turned = model.rest_rig().unwrap().unwrap();
+    let at = |rig: &cagework_core::rig::Rig| rig.joints.iter().map(|joint| joint.at).collect::<Vec<_>>();
+    assert_eq!(at(&turned), UpAxis::Z.turned(&at(&rig)).into_owned());
 }
 
 /// Key of the clip at which the file of clips is at rest, and tolerance for lengths of bones, m.
