@@ -311,7 +311,11 @@ async function start(opened: OpenResult & Needs) {
       const input = () => {
         const [positions, triangles] = engine.modelStates(clip);
         const { smooth } = engine.cageArrays().controls;
-        return { positions, triangles, model: engine.modelPositions(), options, smooth };
+        const rig = clip === undefined ? engine.modelRig() : undefined;
+        // Rings along the skeleton enclose the model at rest only.
+        const kind = clip !== undefined && options.kind === "auto" ? "shell" : options.kind;
+        const model = engine.modelPositions();
+        return { positions, triangles, rig, model, options: { ...options, kind }, smooth };
       };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },

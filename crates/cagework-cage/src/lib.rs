@@ -4,11 +4,13 @@
 
 pub mod check;
 pub mod generate;
+mod kind;
 pub mod samples;
 pub mod skeleton;
 pub mod sleeves;
 
 pub use generate::{CageOptions, GeneratedCage};
+pub use kind::generate_of_kind;
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -1,9 +1,10 @@
 //! `cagework cage`: makes a cage for a model.
 
-use cagework_cage::generate::{BOX_DIVISIONS, CageReport, MIN_VOXELS};
+use cagework_cage::generate::{BOX_DIVISIONS, CageKind, CageReport, MIN_VOXELS, Rings};
 use cagework_core::PolygonMesh;
-use cagework_core::words::three_digits;
-use cagework_io::{MemoryError, Model, shown};
+use cagework_core::rig::Rig;
+use cagework_core::words::{counted, three_digits};
+use cagework_io::{MemoryError, Model, ModelFormat, shown, write_cage_obj};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -19,7 +20,8 @@ struct CageSummary {
     output: String,
     /// Number of models that the cage encloses.
     models: usize,
-    kind: &'static str,
+    /// Kind of the cage: skeleton, shell, hull or box.
+    kind: String,
     vertices: usize,
     faces: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -29,6 +31,9 @@ struct CageSummary {
     /// Report of the cage generator; `None` for a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<CageReport>,
+    /// Rings of a cage along the skeleton.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rings: Option<Rings>,
     notices: Vec<String>,
 }
 
@@ -37,6 +42,8 @@ struct CageInput {
     /// Positions of the vertices relative to `origin`, Y up. `[n_vertices]`, object units
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    /// Joints of all models at rest.
+    rig: Rig,
     /// Origin of the first model, in the axes of its file.
     origin: DVec3,
     models: usize,
@@ -53,12 +60,13 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     let mut summary = CageSummary {
         output: args.output.path.display().to_string(),
         models: around.models,
-        kind: "box",
+        kind: "box".to_owned(),
         vertices: 0,
         faces: 0,
         divisions: None,
         margin: None,
         report: None,
+        rings: None,
         notices: around.notices,
     };
     let cage = match args.kind() {
@@ -67,15 +75,22 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
             (summary.divisions, summary.margin) = (Some(divisions), Some(args.margin));
             box_mesh(&around.positions, divisions, args.margin)?
         }
-        kind => {
-            summary.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
-            let (cage, report) = generate_for(&around.positions, &around.triangles, &args.options())?;
-            summary.report = Some(report);
-            cage
+        _ => {
+            let rig = Some(&around.rig).filter(|rig| !rig.joints.is_empty());
+            let made = generate_for(&around.positions, &around.triangles, rig, &args.options())?;
+            summary.kind = made.report.kind.to_string();
+            (summary.report, summary.rings) = (Some(made.report), made.rings);
+            made.cage.to_polygon_mesh()
         }
     };
     (summary.vertices, summary.faces) = (cage.positions.len(), cage.faces.len());
-    write_cage(&args.output, &args.read.axis().mesh_turned_back(&cage), around.origin)?;
+    let cage = args.read.axis().mesh_turned_back(&cage);
+    match &summary.rings {
+        Some(rings) if args.output.format == ModelFormat::Obj => {
+            write(&args.output.path, &obj_with_rings(&cage, around.origin, rings))?;
+        }
+        _ => write_cage(&args.output, &cage, around.origin)?,
+    }
     if as_json {
         return print(&json(&summary));
     }
@@ -89,6 +104,7 @@ fn enclosed(args: &CageArgs) -> Result<CageInput, CliError> {
     let mut all = CageInput {
         positions: Vec::new(),
         triangles: Vec::new(),
+        rig: Rig::default(),
         origin: DVec3::ZERO,
         models: paths.len(),
         notices: Vec::new(),
@@ -119,6 +135,7 @@ fn enclosed(args: &CageArgs) -> Result<CageInput, CliError> {
         // bits.
         MemoryError::check(bytes, args.read.memory.bytes().min(12 * u64::from(u32::MAX)))
             .map_err(|e| CliError::file(path, format!("with the models before it, {e}")))?;
+        all.rig.append(model.rest_rig().unwrap_or_default().as_ref(), positions.len());
         all.positions.extend(positions);
         all.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
     }
@@ -136,6 +153,30 @@ pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3
     write(&output.path, &export(&Model::of_mesh("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
+/// Writes a cage as an OBJ file with a group for each ring: the faces that end at ring 2 of the chain "leg.L" are in the
+/// group `leg.L.2`. Consecutive faces of a ring are written together.
+fn obj_with_rings(cage: &PolygonMesh, origin: DVec3, rings: &Rings) -> Vec<u8> {
+    let text = write_cage_obj(cage, origin);
+    let lines = text.split_inclusive(|&byte| byte == b'\n');
+    let (faces, vertices): (Vec<&[u8]>, Vec<&[u8]>) = lines.partition(|line| line.starts_with(b"f "));
+    let ring =
+        |face: &Vec<u32>| face.iter().map(|&v| rings.places[v as usize]).map(|at| (at.chain, at.ring)).max();
+    let mut grouped: Vec<_> = cage.faces.iter().map(ring).zip(faces).collect();
+    grouped.sort_by_key(|(ring, _)| *ring);
+    let mut text = vertices.concat();
+    for group in grouped.chunk_by(|a, b| a.0 == b.0) {
+        if let Some((chain, ring)) = group[0].0 {
+            let name: String = rings.chains[chain as usize]
+                .chars()
+                .map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c })
+                .collect();
+            text.extend(format!("g {name}.{ring}\n").bytes());
+        }
+        group.iter().for_each(|(_, face)| text.extend_from_slice(face));
+    }
+    text
+}
+
 fn text(summary: &CageSummary) -> String {
     let around = match summary.models {
         1 => String::new(),
@@ -151,21 +192,28 @@ fn text(summary: &CageSummary) -> String {
         );
     };
     let mut text = format!(
-        "wrote {}{around}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; minimum distance from the model {}",
+        "wrote {}{around}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms",
         shown(&summary.output),
         summary.vertices,
         summary.faces,
         100.0 * f64::from(report.quads) / f64::from(report.faces.max(1)),
         report.elapsed_ms,
-        three_digits(report.clearance)
     );
+    text += &match &summary.rings {
+        Some(rings) => {
+            let n = |count: usize, one, many| counted(count, one, many);
+            let (loops, chains) = (rings.loops().len(), rings.chains.len());
+            format!(", in {} along {}", n(loops, "ring", "rings"), n(chains, "chain", "chains"))
+        }
+        None => format!("; minimum distance from the model {}", three_digits(report.clearance)),
+    };
     if let Some(mirror) = report.mirror {
         text.push_str(&format!(", symmetric in {}", format!("{mirror:?}").to_lowercase()));
     }
     if report.parts > 1 {
         text.push_str(&format!(", {} closed parts", report.parts));
     }
-    if report.vertices > report.target {
+    if report.vertices > report.target && report.kind != CageKind::Skeleton {
         text.push_str(&format!(
             ".\nnote: the model's shape needs {} vertices instead of {}",
             report.vertices, report.target
@@ -177,8 +225,37 @@ fn text(summary: &CageSummary) -> String {
             ));
         }
     }
-    for notice in &report.notices {
+    let refusal = report
+        .refusal
+        .iter()
+        .map(|why| format!("a {} instead of rings along the skeleton: {why}", report.kind));
+    for notice in report.notices.iter().cloned().chain(refusal) {
         text.push_str(&format!("\nnote: {notice}"));
     }
     text + &notices
+}
+
+#[cfg(test)]
+mod tests {
+    use cagework_cage::generate::RingPlace;
+
+    use super::*;
+
+    #[test]
+    fn faces_are_grouped_by_the_ring_at_which_they_end() {
+        // A box of two rings of four vertices; the faces between them, then the ends.
+        let mut faces: Vec<Vec<u32>> = (0..4).map(|k| vec![k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k]).collect();
+        faces.insert(2, vec![3, 2, 1, 0]);
+        faces.push(vec![4, 5, 6, 7]);
+        let cage = PolygonMesh { positions: vec![Vec3::ZERO; 8], faces };
+        let place = |v: u32| RingPlace { chain: 0, ring: v / 4, place: v % 4 };
+        let rings = Rings { chains: vec!["upper leg".into()], places: (0..8).map(place).collect() };
+        let text = String::from_utf8(obj_with_rings(&cage, DVec3::ZERO, &rings)).unwrap();
+        let faces = text.split_once("g upper_leg.0\n").unwrap().1;
+        assert_eq!(
+            faces,
+            "f 4 3 2 1\ng upper_leg.1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\nf 5 6 7 8\n"
+        );
+        assert_eq!(rings.loops()[&(0, 1)], [4, 5, 6, 7]);
+    }
 }

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use cagework_cage::CageOptions;
-use cagework_cage::generate::{BOX_MARGIN, CageReport, generate};
+use cagework_cage::generate::BOX_MARGIN;
 use cagework_cage::samples::{self, Sample};
+use cagework_cage::{CageOptions, GeneratedCage, generate_of_kind};
 use cagework_core::cage::MAX_FACES;
+use cagework_core::rig::Rig;
 use cagework_core::words::counted;
 use cagework_core::{
     Bounds, Cage, CageError, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh, subdivided_box,
@@ -136,8 +137,10 @@ pub(crate) fn load_cage(
         CageSource::Auto(options) => {
             let options = CageOptions { smooth: controls.smooth.smooth, ..*options };
             let (positions, triangles) = states_of(around, None)?;
-            let cage = generate_for(&positions, &triangles, &options)?.0;
-            Model::of_mesh("generated cage", &cage, around.origin())?
+            // As in [`Model::states`], a rig that cannot be read is ignored.
+            let rig = around.rest_rig().unwrap_or_default();
+            let made = generate_for(&positions, &triangles, rig.as_ref(), &options)?;
+            Model::of_mesh("generated cage", &made.cage.to_polygon_mesh(), around.origin())?
         }
     };
     LoadedCage::new(model, around.up(), memory, controls)
@@ -169,17 +172,17 @@ pub(crate) fn states_of(model: &Model, clip: Option<&str>) -> Result<(Vec<Vec3>,
     model.states(clip).map_err(|e| CliError::file(model.name.as_ref(), e))
 }
 
-/// Generates a cage around triangles, and shows a progress bar.
+/// Generates a cage around triangles, and shows a progress bar. `rig`: joints at rest.
 ///
 /// # Errors
-/// The errors of [`generate`].
+/// The errors of [`generate_of_kind`].
 pub(crate) fn generate_for(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
+    rig: Option<&Rig>,
     options: &CageOptions,
-) -> Result<(PolygonMesh, CageReport), CliError> {
-    let made = generate(positions, triangles, options, &Bar::start())?;
-    Ok((made.cage.to_polygon_mesh(), made.report))
+) -> Result<GeneratedCage, CliError> {
+    Ok(generate_of_kind(positions, triangles, rig, options, &Bar::start())?)
 }
 
 /// Builds a subdivided box around positions. `margin`: distance from the box to the positions, as a fraction of their

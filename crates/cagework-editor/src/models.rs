@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::TriMesh;
+use cagework_core::rig::Rig;
 use cagework_core::splats::Splats;
 use cagework_io::{Clip, Model, UnknownClip, UpAxis};
 use cagework_pose::Parts;
@@ -432,6 +433,18 @@ impl Models {
             positions.extend(own);
         }
         Ok((positions, triangles))
+    }
+
+    /// Joints of all models at rest and their influences on the vertices that [`Self::states`] returns without a clip.
+    /// Joints of the same name are one. `None` without joints, or if they cannot be read.
+    #[must_use]
+    pub fn rest_rig(&self) -> Option<Rig> {
+        let mut all = Rig::default();
+        for member in self.iter() {
+            let n = member.model.states(None).ok()?.0.len();
+            all.append(member.model.rest_rig().ok().flatten().as_ref(), n);
+        }
+        Some(all).filter(|rig| !rig.joints.is_empty())
     }
 
     /// Parts of all models that stay in place or are rigid.

@@ -56,9 +56,14 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
     bl_description = "Make a cage around the selected meshes, without their modifiers and shape keys"
 
     vertices: bpy.props.IntProperty(name="Vertices", description="Largest number of vertices", default=80, min=8, max=400)
-    shape: bpy.props.EnumProperty(
-        name="Shape",
-        items=[("follow", "Follow", "Follows the limbs"), ("hull", "Hull", "The convex hull")],
+    kind: bpy.props.EnumProperty(
+        name="Kind",
+        items=[
+            ("auto", "Auto", "Rings along the limbs if they fit well, otherwise a shell"),
+            ("skeleton", "Skeleton", "Rings of quads along the limbs"),
+            ("shell", "Shell", "Follows the surface"),
+            ("hull", "Hull", "The convex hull"),
+        ],
     )
     clearance: bpy.props.FloatProperty(
         name="Clearance", description="Distance from the mesh, as a fraction of its diagonal", default=0.0, min=0.0, max=0.25
@@ -80,7 +85,7 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
             points.append(binding.transform(binding.basis(obj.data), obj.matrix_world))
             triangles.append(corners.reshape(-1, 3) + n)
             n += len(points[-1])
-        options = {"target": self.vertices, "shape": self.shape, "clearance": self.clearance}
+        options = {"target": self.vertices, "kind": self.kind, "clearance": self.clearance}
         try:
             made = cw.generate_cage(np.concatenate(points), np.concatenate(triangles), **options)
         except cw.Error as error:

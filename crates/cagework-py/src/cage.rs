@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use cagework_cage::CageOptions;
 use cagework_cage::check::check_smooth;
-use cagework_cage::generate::{CageReport, generate};
+use cagework_cage::generate::{CageReport, Rings};
+use cagework_cage::{CageOptions, generate_of_kind};
 use cagework_core::crossing::notices;
 use cagework_core::options::{GRID, SMOOTH_STEPS};
 use cagework_core::{Cage as CoreCage, ControlSet, Controls, InnerControls, PolygonMesh};
@@ -40,6 +40,7 @@ pub(crate) struct Cage {
     /// Rest positions `[n_cage, 3]`; read-only.
     vertices: Py<PyArray2<f64>>,
     report: Option<CageReport>,
+    rings: Option<Rings>,
 }
 
 impl Cage {
@@ -54,7 +55,7 @@ impl Cage {
         let set = ControlSet::new(&cage, smooth, InnerControls::default()).map_err(error::cage)?;
         let vertices = arrays::wide_array_of(py, cage.positions().iter().map(|p| origin + p.as_dvec3()))?;
         vertices.call_method1("setflags", (false,))?;
-        Ok(Self { set, origin, vertices: vertices.unbind(), report })
+        Ok(Self { set, origin, vertices: vertices.unbind(), report, rings: None })
     }
 
     /// Origin to which the positions are relative: zero unless the cage is far away from the world's origin.
@@ -168,7 +169,15 @@ impl Cage {
         dictionary(py, &work::run(py, move |_| check_smooth(&mesh, None, None, smooth))?)
     }
 
-    /// Report of generate_cage: dict with voxels, clearance, mirror and other entries; None for other cages.
+    /// Rings of a generated cage of the kind "skeleton": dict with chains, the names of the limbs, and places, for each
+    /// vertex a dict with chain (index), ring and place in the ring; None for other cages.
+    #[getter]
+    fn rings<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.rings.as_ref().map(|rings| dictionary(py, rings)).transpose()
+    }
+
+    /// Report of generate_cage: dict with kind, refusal, voxels, clearance, mirror and other entries; None for other
+    /// cages.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.report.as_ref().map(|report| dictionary(py, report)).transpose()
@@ -185,14 +194,15 @@ impl Cage {
     }
 }
 
-/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, *, progress=None, **options) -> Cage
+/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, *, rig=None, progress=None, **options) -> Cage
 ///
 /// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap
-/// itself.
+/// itself. rig: the model, or list of models, from which read_model read them, for the joints: path or bytes.
 ///
 /// Options, as for `cagework cage`: target=80 (number of vertices, 8 to 400; simple shapes get fewer, and holes and gaps
-/// may need more), detail=0.028 (fraction of the longest side), quads=True, shape="follow" or "hull", symmetry="auto",
-/// "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of the diagonal), voxels=0 (along the longest
+/// may need more), detail=0.028 (fraction of the longest side), quads=True, kind="auto", "skeleton" (rings of quads along
+/// the limbs), "shell" (follows the surface) or "hull"; auto is skeleton if it fits well, otherwise shell, and
+/// cage.report["refusal"] says why; symmetry="auto", "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of the diagonal), voxels=0 (along the longest
 /// side; 0: derived from target), smooth=0 (steps of subdivision; the smooth surface encloses the model). progress: as
 /// for bind.
 ///
@@ -202,11 +212,12 @@ impl Cage {
 /// >>> cage.vertices.shape[1]
 /// 3
 #[pyfunction]
-#[pyo3(signature = (vertices, triangles, *, progress = None, **options))]
+#[pyo3(signature = (vertices, triangles, *, rig = None, progress = None, **options))]
 pub(crate) fn generate_cage(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
     triangles: &Bound<'_, PyAny>,
+    rig: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Cage> {
@@ -215,10 +226,14 @@ pub(crate) fn generate_cage(
     let (points, origin) = arrays::points_and_origin("vertices", vertices, None)?;
     let triangles = arrays::triangles(triangles)?;
     let positions = points.as_slice();
-    let generated =
-        work::run_with(py, progress, |progress| generate(positions, &triangles, &options, progress))?;
+    let rig = rig.map(|rig| files::rig(py, rig, positions.len(), origin)).transpose()?;
+    let generated = work::run_with(py, progress, |progress| {
+        generate_of_kind(positions, &triangles, rig.as_ref(), &options, progress)
+    })?;
     let generated = generated.map_err(error::cage)?;
-    Cage::of(py, (&generated.cage.to_polygon_mesh(), origin), options.smooth, Some(generated.report))
+    let report = Some(generated.report);
+    let cage = Cage::of(py, (&generated.cage.to_polygon_mesh(), origin), options.smooth, report)?;
+    Ok(Cage { rings: generated.rings, ..cage })
 }
 
 /// Lists the faults of a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict

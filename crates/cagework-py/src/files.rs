@@ -4,7 +4,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
+use cagework_core::rig::Rig;
 use cagework_io::{Clip, Model, Resolve};
+use glam::DVec3;
 use numpy::PyArray2;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -101,6 +103,45 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
     std::fs::write(path, bytes).map_err(|e| named(path, &e))
 }
 
+/// Interprets an argument that is a model or a list of models.
+fn sources(name: &str, models: &Bound<'_, PyAny>) -> PyResult<Vec<Source>> {
+    match models.cast::<PyList>() {
+        Ok(models) => models.iter().map(|model| Source::of(name, &model)).collect(),
+        Err(_) => Ok(vec![Source::of(name, models)?]),
+    }
+}
+
+/// Reads the joints of the models from which `n` vertices were read, at rest or with the ends of their morph targets.
+/// `origin`: point to which the vertices are relative.
+///
+/// # Errors
+/// `OSError`, `ModelError` if a model cannot be read or the models have another number of vertices.
+pub(crate) fn rig(py: Python<'_>, models: &Bound<'_, PyAny>, n: usize, origin: DVec3) -> PyResult<Rig> {
+    let sources = sources("rig", models)?;
+    work::run(py, move |_| -> PyResult<_> {
+        let mut all = Vec::new();
+        for source in &sources {
+            let mut model = source.read()?;
+            model.set_origin(origin);
+            let rig = model.rest_rig().map_err(error::model)?;
+            let states = model.states(None).map_err(error::model)?.0.len();
+            all.push((rig, [model.positions.len(), states]));
+        }
+        let totals = [0, 1].map(|k| all.iter().map(|(_, n)| n[k]).sum::<usize>());
+        let Some(k) = totals.iter().position(|&total| total == n) else {
+            let [rest, states] = totals;
+            return Err(error::model(format!(
+                "rig has {rest} vertices, or {states} with its morph targets; vertices has {n}: give the model from which they were read"
+            )));
+        };
+        let mut joined = Rig::default();
+        for (rig, n) in &all {
+            joined.append(rig.as_ref(), n[k]);
+        }
+        Ok(joined)
+    })?
+}
+
 /// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
 /// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such
@@ -125,10 +166,7 @@ pub(crate) fn read_model<'py>(
     states: bool,
     clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
-    let sources: Vec<Source> = match model.cast::<PyList>() {
-        Ok(models) => models.iter().map(|model| Source::of("model", &model)).collect::<PyResult<_>>()?,
-        Err(_) => vec![Source::of("model", model)?],
-    };
+    let sources = sources("model", model)?;
     let (positions, triangles, origin) = work::run(py, move |_| -> PyResult<_> {
         let (mut positions, mut triangles, mut origin) = (Vec::new(), Vec::new(), None);
         let is_alone = sources.len() == 1;

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 import cagework as cw
 
 points: NDArray[np.float32] = np.zeros((5, 3), np.float32)
-cage: cw.Cage = cw.generate_cage(points, [[0, 1, 2]], target=40, shape="hull")
+cage: cw.Cage = cw.generate_cage(points, [[0, 1, 2]], target=40, kind="hull")
 weights, report = cw.bind(points, cage, grid=32, outside="stay")
 matrix: csr_array = weights
 moved: NDArray[np.float32] | NDArray[np.float64] = cw.deform(weights, cage.vertices, report)

@@ -7,8 +7,8 @@ mod results;
 use std::cell::RefCell;
 
 use cagework_cage::check::{check_smooth, repair_smooth};
-use cagework_cage::generate::{CageOptions, GeneratedCage, generate};
 use cagework_cage::samples::{self, Sample};
+use cagework_cage::{CageOptions, GeneratedCage, generate_of_kind};
 use cagework_core::field::{self, Lattice};
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::NoProgress;
@@ -23,7 +23,7 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, points};
-use crate::cage::{CageArrays, control_set};
+use crate::cage::{CageArrays, RigArrays, control_set};
 use crate::clock::Listener;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::opening::PoseArrays;
@@ -148,7 +148,8 @@ impl Binder {
         Ok(BindResult { weights: binding.weights, offsets, report: None })
     }
 
-    /// Generates a cage whose surface after `smooth` subdivision steps encloses the model. `progress` as for `bind`.
+    /// Generates a cage whose surface after `smooth` subdivision steps encloses the model. `rig`: the model's joints
+    /// (`RigArrays`), or undefined. `progress` as for `bind`.
     ///
     /// # Errors
     /// If the model has no triangles or an option is out of range.
@@ -157,6 +158,7 @@ impl Binder {
         &self,
         positions: &[f32],
         triangles: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "RigArrays | undefined")] rig: JsValue,
         #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
         smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
@@ -164,10 +166,14 @@ impl Binder {
         let options = CageOptions { smooth, ..decode(options)? };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
-        let GeneratedCage { cage, report } = generate(&points(positions), &triangles, &options, &listener)?;
+        let rig: Option<RigArrays> = decode(rig)?;
+        let rig = rig.map(RigArrays::rig);
+        let GeneratedCage { cage, report, rings } =
+            generate_of_kind(&points(positions), &triangles, rig.as_ref(), &options, &listener)?;
         let bridged = if report.separate > report.parts { report.separate } else { 0 };
         let arrays = CageArrays::of(&cage.to_polygon_mesh());
-        Ok(object(&CageArrays { bridged, notices: report.notices, ..arrays }))
+        let (kind, refusal) = (Some(report.kind), report.refusal);
+        Ok(object(&CageArrays { bridged, notices: report.notices, kind, refusal, rings, ..arrays }))
     }
 
     /// Transfers poses, `[n_poses, n_old, 3]`, from an old cage to a new one around the same model, see

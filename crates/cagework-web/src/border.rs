@@ -24,6 +24,7 @@ use serde_json::{Map, Value};
 use ts_rs::{Config, TS, TypeVisitor};
 
 use crate::binder::BuiltSample;
+use crate::cage::RigArrays;
 use crate::error::ErrorName;
 use crate::opening::OpenContents;
 use crate::options::JsSceneOptions;
@@ -74,6 +75,7 @@ fn generated_types_are_up_to_date() {
     found.visit::<BuiltSample>();
     found.visit::<BindReport>();
     found.visit::<CageState>();
+    found.visit::<RigArrays>();
     found.visit::<Problem>();
     found.visit::<ModelInfo>();
     found.visit::<Command>();

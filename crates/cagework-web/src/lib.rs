@@ -44,7 +44,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, BoundArrays, BuiltSample, CageArrays, CageControls, CageOptions, CageState, Command,
   Coordinates, Frames, Gesture, GizmoPart, GrabInput, GrabResult, Legend, ModelFormat, ModelInfo, Offsets, OpenContents,
-  Problem, Progress, PullFrame, Repair, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
+  Problem, Progress, PullFrame, Repair, RigArrays, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
   View } from "../contract/generated";
 
 /** Column indices and weights from `start` to `end` of sparse rows. */

@@ -13,10 +13,11 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, pose};
 use crate::binder::Binder;
-use crate::cage::control_set;
+use crate::cage::{RigArrays, control_set};
 use crate::error::{Answer, ErrorName, Fault};
 use crate::loaded::LoadedModel;
 use crate::options::decode;
+use crate::views::object;
 use crate::weights::BoundArrays;
 
 #[wasm_bindgen]
@@ -25,6 +26,15 @@ impl LoadedModel {
     #[wasm_bindgen(getter)]
     pub fn triangles(&self) -> Vec<u32> {
         self.model.triangles.as_flattened().to_vec()
+    }
+
+    /// Joints of the model at rest; undefined without joints.
+    ///
+    /// # Errors
+    /// If the joints cannot be read.
+    #[wasm_bindgen(unchecked_return_type = "RigArrays | undefined")]
+    pub fn rig(&self) -> Answer<JsValue> {
+        Ok(self.model.rest_rig()?.map_or(JsValue::UNDEFINED, |rig| object(&RigArrays::of(&rig))))
     }
 
     /// Returns the geometry that a cage should enclose: positions and triangles of the model at rest, with each morph

@@ -78,8 +78,8 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const positions = pointsOf("positions", mesh.positions);
       const triangles = trianglesOf("triangles", mesh.triangles);
       const asked = optionsOf(CAGE_DEFAULTS, options);
-      const input = { positions, triangles, model: positions, options: asked, smooth: 0 };
-      const { origin } = mesh;
+      const { origin, rig } = mesh;
+      const input = { positions, triangles, rig, model: positions, options: asked, smooth: 0 };
       if (origin) originOf("origin", origin);
       const made = await run("cage", input, options);
       return {
@@ -87,6 +87,9 @@ export function createApi(open: () => Promise<Runtime>): Api {
         positions: made.positions,
         corners: made.corners,
         problems: made.check ?? [],
+        kind: made.kind ?? asked.kind,
+        ...(made.refusal === undefined ? {} : { refusal: made.refusal }),
+        ...(made.rings === undefined ? {} : { rings: made.rings }),
       };
     },
     async deform(weights, posed) {

@@ -48,9 +48,12 @@ export type {
   BindOptions,
   BindReport,
   CageControls,
+  CageKind,
   CageOptions,
   ErrorName,
   Problem,
+  RigArrays,
   RigOptions,
+  Rings,
 } from "./contract/generated";
 export type * from "./types";

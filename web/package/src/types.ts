@@ -4,11 +4,14 @@ import type {
   BindOptions,
   BindReport,
   CageControls,
+  CageKind,
   CageOptions,
   Offsets,
   Problem,
   Progress,
+  RigArrays,
   RigOptions,
+  Rings,
 } from "./contract/generated";
 import type { Reading } from "./contract/work";
 
@@ -32,6 +35,8 @@ export interface OriginOption {
 export interface Mesh extends OriginOption {
   readonly positions: ArrayLike<number>;
   readonly triangles: ArrayLike<number>;
+  /** Joints of the model at rest, along which `generateCage` makes rings. */
+  readonly rig?: RigArrays | undefined;
 }
 
 /** A mesh read from a file. */
@@ -57,6 +62,12 @@ export interface GeneratedCage extends Cage {
   readonly corners: Uint32Array;
   /** Result of the cage check. Contains no problem of severity "error". */
   readonly problems: readonly Problem[];
+  /** Kind of the cage: "skeleton", "shell" or "hull". */
+  readonly kind: CageKind;
+  /** Why a cage of the kind "auto" has no rings, one sentence. */
+  readonly refusal?: string;
+  /** Rings of a cage of the kind "skeleton": the place of each vertex, and the names of the limbs. */
+  readonly rings?: Rings;
 }
 
 /**

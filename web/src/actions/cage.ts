@@ -64,7 +64,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
   let isPreviewing = false;
 
   const optionsOf = ({ cageSource, cageOptions }: CageSettings): CageOptions => {
-    const hull = { shape: "hull", target: HULL_TARGET, voxels: 0 } as const;
+    const hull = { kind: "hull", target: HULL_TARGET, voxels: 0 } as const;
     return cageSource === "hull" ? { ...cageOptions, ...hull } : cageOptions;
   };
   const isCurrent = (settings: CageSettings) =>

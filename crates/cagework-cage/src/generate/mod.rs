@@ -45,9 +45,9 @@ use guarded::GuardedSurface;
 pub(crate) use guarded::MIN_FOLD_COSINE;
 use lattice::{Lattice, MARGIN_VOXELS};
 pub use options::{
-    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS,
-    GeneratedCage, HULL_TARGET, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry,
-    TARGET, VOXELS,
+    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageKind, CageOptions, CageReport, DETAIL, DIVISIONS,
+    GeneratedCage, HULL_TARGET, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, RingPlace, Rings,
+    Symmetry, TARGET, VOXELS,
 };
 use quads::Faces;
 use shell::Shell;
@@ -98,8 +98,10 @@ const MAX_NOTICES: usize = 3;
 /// Limit on rounds that split quads back into triangles where verification fails.
 const MAX_SPLIT_ROUNDS: usize = 4;
 
-/// Generates a cage that strictly encloses a model. With [`CageOptions::smooth`], the subdivided surface encloses the
-/// model.
+pub(crate) use options::check as check_input;
+
+/// Generates a hull ([`CageKind::Hull`]) or a shell (all other kinds) that strictly encloses a model. With
+/// [`CageOptions::smooth`], the subdivided surface encloses the model.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
 /// `[n_triangles]`, any soup. A cage of 80 vertices for a human figure takes 0.2 to 1.5 s on one core, most of it for
@@ -139,17 +141,17 @@ fn generate_plain(
     let affordable = affordable_voxels(finest.n_rows(positions, triangles, &go_on)?);
     let base = first_voxels(target).min(affordable);
     let most_gaps = target / VERTICES_PER_GAP;
-    let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
+    let NarrowGaps { gaps, stretch, voxels: finest } = match (options.kind, options.smooth) {
         // The lattice is refined for gaps only without subdivision: a subdivided surface lies inside its cage, and the
         // finer lattice would leave less space between the cage and the model.
-        (Shape::Follow, 0) if affordable == MAX_VOXELS => {
+        (kind, 0) if kind != CageKind::Hull && affordable == MAX_VOXELS => {
             let clearance = options.distance(bounds);
             gaps::narrow_gaps(&soup, bounds, clearance, [base, most_gaps], &go_on)?
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
-    let components = match (options.per_component, options.shape) {
-        (true, Shape::Follow) => {
+    let components = match (options.per_component, options.kind) {
+        (true, kind) if kind != CageKind::Hull => {
             let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), options, &go_on);
             Components::find(|n| Ok(shell(n)?.separate), [base, affordable], target)?
         }
@@ -200,6 +202,8 @@ fn generate_plain(
         let notices =
             components.notice(parts, options).into_iter().chain(coarser).chain(closed.take(MAX_NOTICES));
         let report = CageReport {
+            kind: if options.kind == CageKind::Hull { CageKind::Hull } else { CageKind::Shell },
+            refusal: None,
             target: options.target,
             vertices: cage.n_vertices() as u32,
             faces: cage.faces().len() as u32,
@@ -217,7 +221,7 @@ fn generate_plain(
             attempts: attempt as u32,
             elapsed_ms: progress.now_ms() - began,
         };
-        return Ok(GeneratedCage { cage, report });
+        return Ok(GeneratedCage { cage, report, rings: None });
     }
     Err(CageGenError::Unresolved)
 }

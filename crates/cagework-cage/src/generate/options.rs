@@ -1,5 +1,7 @@
 //! Options, report and errors of [`super::generate`].
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -66,7 +68,7 @@ pub const DIVISIONS: Number = Number {
     slider: Some(Slider { min: 1.0, max: 8.0, step: 1.0 }),
 };
 
-/// Default of [`CageOptions::target`] for [`Shape::Hull`], which does not follow limbs.
+/// Default of [`CageOptions::target`] for [`CageKind::Hull`], which does not follow limbs.
 pub const HULL_TARGET: u32 = 24;
 /// Default number of quads along each edge of a box cage.
 pub const BOX_DIVISIONS: u32 = 2;
@@ -74,11 +76,17 @@ pub const BOX_DIVISIONS: u32 = 2;
 pub const BOX_MARGIN: f32 = 0.05;
 
 choice! {
-    /// Shape that the cage follows.
-    Shape {
-        /// The surface of the model, including its limbs.
+    /// Kind of a generated cage. Serde aliases are names in older project files.
+    CageKind {
+        /// Sleeves if they enclose the model and score better than the shell, otherwise the shell
+        /// ([`crate::generate_of_kind`]).
         #[default]
-        Follow = "follow",
+        #[serde(alias = "follow")]
+        Auto = "auto",
+        /// Sleeves of quads along the limbs of a skeleton ([`crate::sleeves`]).
+        Skeleton = "skeleton",
+        /// A simplified offset surface that follows the model, including its limbs.
+        Shell = "shell",
         /// Approximate convex hull of the model (26 planes).
         Hull = "hull",
     }
@@ -116,7 +124,7 @@ pub enum Mirror {
 }
 
 impl Mirror {
-    pub(super) fn of_axis(axis: usize) -> Self {
+    pub(crate) fn of_axis(axis: usize) -> Self {
         [Self::X, Self::Y, Self::Z][axis]
     }
 }
@@ -135,8 +143,9 @@ pub struct CageOptions {
     pub detail: f32,
     /// Whether to pair triangles into quads. Default true.
     pub quads: bool,
-    /// Shape that the cage follows. Default follow.
-    pub shape: Shape,
+    /// Kind of cage. Default auto.
+    #[serde(alias = "shape")]
+    pub kind: CageKind,
     /// Mirror symmetry. Default auto.
     pub symmetry: Symmetry,
     /// Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
@@ -160,7 +169,7 @@ impl Default for CageOptions {
             target: 80,
             detail: 0.028,
             quads: true,
-            shape: Shape::default(),
+            kind: CageKind::default(),
             symmetry: Symmetry::default(),
             per_component: false,
             clearance: 0.0,
@@ -196,11 +205,55 @@ pub struct GeneratedCage {
     pub cage: Cage,
     /// Statistics of the generation.
     pub report: CageReport,
+    /// Rings of a cage of sleeves.
+    pub rings: Option<Rings>,
+}
+
+/// Rings of a cage of sleeves: a ring is a closed loop of vertices around a chain of the skeleton.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Rings {
+    /// Names of the chains; the first is the trunk.
+    pub chains: Vec<String>,
+    /// Place of each vertex of the cage. `[n_cage]`
+    pub places: Vec<RingPlace>,
+}
+
+/// Place of a cage vertex in a ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RingPlace {
+    /// Index of the chain in [`Rings::chains`].
+    pub chain: u32,
+    /// Number of the ring along the chain, from 0 at the ring nearest to the parent.
+    pub ring: u32,
+    /// Number of the vertex in the ring, in order around it.
+    pub place: u32,
+}
+
+impl Rings {
+    /// Vertices of each ring, by chain and ring.
+    #[must_use]
+    pub fn loops(&self) -> BTreeMap<(u32, u32), Vec<u32>> {
+        let mut loops: BTreeMap<(u32, u32), Vec<(u32, u32)>> = BTreeMap::new();
+        for (vertex, at) in (0..).zip(&self.places) {
+            loops.entry((at.chain, at.ring)).or_default().push((at.place, vertex));
+        }
+        let sorted = |mut ring: Vec<(u32, u32)>| {
+            ring.sort_unstable();
+            ring.into_iter().map(|(_, vertex)| vertex).collect()
+        };
+        loops.into_iter().map(|(key, ring)| (key, sorted(ring))).collect()
+    }
 }
 
 /// Statistics of the generation of a cage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageReport {
+    /// Kind of the cage: skeleton, shell or hull.
+    pub kind: CageKind,
+    /// Why the kind auto made no sleeves, one sentence; `None` for other kinds, and if it made them.
+    pub refusal: Option<String>,
     /// Target number of vertices, as in the options.
     pub target: u32,
     /// Number of vertices of the cage.
@@ -212,25 +265,26 @@ pub struct CageReport {
     /// Whether the cage has at most a tenth more vertices than the target. If not, the model's holes and gaps need
     /// more.
     pub target_met: bool,
-    /// Voxels along the model's longest side.
+    /// Voxels along the model's longest side; 0 for sleeves, which use no voxels.
     pub voxels: u32,
-    /// Longest edge of a voxel, object units. Gaps narrower than three voxels are closed.
+    /// Longest edge of a voxel, object units; 0 for sleeves. Gaps narrower than three voxels are closed.
     pub voxel_size: f32,
-    /// Distance from the model that every point of the cage keeps along at least one axis, object units.
+    /// Distance from the model that every point of the cage keeps along at least one axis, object units; 0 for sleeves,
+    /// which enclose the model without a guaranteed distance.
     pub clearance: f32,
     /// Axis along which the cage is mirror-symmetric; `None` if it is not symmetric by construction.
     pub mirror: Option<Mirror>,
-    /// Gaps of the model that the cage closes, one sentence each with a remedy.
+    /// Gaps of the model that the cage closes, and limbs without a sleeve, one sentence each with a remedy.
     pub notices: Vec<String>,
     /// Connected components of the cage.
     pub parts: u32,
     /// Number of components of the hull before bridging.
     pub separate: u32,
-    /// Number of vertices of the hull before simplification.
+    /// Number of vertices of the hull before simplification; 0 for sleeves.
     pub hull_vertices: u32,
     /// Whether the cage is the unsimplified hull.
     pub hull: bool,
-    /// Number of lattices tried.
+    /// Number of lattices tried; 0 for sleeves.
     pub attempts: u32,
     /// Wall-clock time, milliseconds.
     pub elapsed_ms: f64,
@@ -281,6 +335,9 @@ pub enum CageGenError {
         "no cage passes the final check: the model is too small for its distance from the origin; move it to the origin"
     )]
     Unresolved,
+    /// No sleeves were made. The text is one sentence.
+    #[error("no cage of sleeves: {0}")]
+    Sleeves(String),
     /// No subdivided surface encloses the model.
     #[error(
         "no cage was found whose smooth surface encloses the model: use fewer steps (--smooth) or more vertices"
@@ -292,7 +349,7 @@ pub enum CageGenError {
 }
 
 /// Checks input and options. Returns the corners of the model's box.
-pub(super) fn check(
+pub(crate) fn check(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,

@@ -14,7 +14,7 @@ use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::soup::Soup;
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
-use super::{CageOptions, Shape, Symmetry, first_voxels};
+use super::{CageKind, CageOptions, Symmetry, first_voxels};
 use cagework_core::progress::Cancellation;
 
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
@@ -135,9 +135,9 @@ impl Shell {
         let rough = Lattice::around(bounds, n, stretch, MARGIN_VOXELS);
         let layers = layers_for(rough.shortest());
         let lattice = Lattice::around(bounds, n, stretch, MARGIN_VOXELS + layers);
-        let touched = match options.shape {
-            Shape::Follow => lattice.voxelize(positions, triangles, &|f| go_on(0.5 * f))?,
-            Shape::Hull => slab_hull(&lattice, positions),
+        let touched = match options.kind {
+            CageKind::Hull => slab_hull(&lattice, positions),
+            _ => lattice.voxelize(positions, triangles, &|f| go_on(0.5 * f))?,
         };
         let mut solid = touched.filled();
         let mirror = if stretch == DVec3::ONE {

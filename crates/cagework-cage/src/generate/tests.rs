@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3, vec3};
 use proptest::prelude::*;
 
 use super::{
-    CageGenError, CageOptions, CageReport, GeneratedCage, Lattice, MAX_ROWS, Mirror, Shape, Symmetry,
+    CageGenError, CageKind, CageOptions, CageReport, GeneratedCage, Lattice, MAX_ROWS, Mirror, Symmetry,
     generate,
 };
 use cagework_core::bind::bind;
@@ -359,7 +359,7 @@ fn a_coarse_lattice_joins_no_components_unless_the_cage_has_too_few_vertices() {
 
 #[test]
 fn hull_spans_the_gap_between_the_legs() {
-    let hull = CageOptions { shape: Shape::Hull, ..options(16) };
+    let hull = CageOptions { kind: CageKind::Hull, ..options(16) };
     let made = make(&trousers(), &hull);
     assert!(made.report.target_met);
     assert!(

@@ -32,6 +32,7 @@ use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+use crate::generate::RingPlace;
 use crate::skeleton::{Chain, Skeleton};
 use base::Place;
 use fit::Fit;
@@ -64,17 +65,6 @@ const SAME_RING: f64 = 0.01;
 
 /// Shortest straightened tip.
 const MIN_TIP: f64 = 0.02;
-
-/// Place of a cage vertex in a ring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RingPlace {
-    /// Index in [`Sleeves::chains`].
-    pub chain: u32,
-    /// Number of the ring along the chain, from 0 at the ring nearest to the parent.
-    pub ring: u32,
-    /// Number of the vertex in the ring, in order around it.
-    pub place: u32,
-}
 
 /// A cage made of sleeves.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use cagework_cage::check::Repair;
 use cagework_cage::generate::{
-    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageOptions, DETAIL, DIVISIONS, HULL_TARGET, Shape, Symmetry,
+    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageKind, CageOptions, DETAIL, DIVISIONS, HULL_TARGET, Symmetry,
     TARGET, VOXELS,
 };
 use cagework_core::BindOptions;
@@ -32,7 +32,8 @@ pub(crate) struct CageArgs {
     /// File to write (.obj keeps the order of the cage's vertices; .glb opens in any viewer).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
-    /// Kind of cage: auto follows the model's limbs, box is its bounding box, hull its convex hull
+    /// Kind of cage: skeleton has rings of quads along the limbs, shell follows the surface, hull is the convex hull,
+    /// box the bounding box; auto is skeleton if it fits well, otherwise shell
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
@@ -92,6 +93,12 @@ impl CageArgs {
             ("--voxels", self.voxels != usual.voxels),
             ("--smooth", self.smooth.smooth != usual.smooth),
         ];
+        if self.kind() == KindArg::Skeleton && self.around_clip.is_some() {
+            return Err(CliError::Mismatch {
+                message: "--around-clip: rings along the skeleton enclose the model at rest only".to_owned(),
+                hint: "leave out --kind for a cage that encloses the clip",
+            });
+        }
         let (unused, why, hint) = if self.kind() == KindArg::Box {
             (
                 of_others.as_slice(),
@@ -113,12 +120,17 @@ impl CageArgs {
 
     /// Options for generating the cage.
     pub(crate) fn options(&self) -> CageOptions {
-        let hull = self.kind() == KindArg::Hull;
+        let kind = match self.kind() {
+            // Sleeves follow the skeleton at rest.
+            KindArg::Auto if self.around_clip.is_some() => CageKind::Shell,
+            kind => kind.generated(),
+        };
+        let hull = kind == CageKind::Hull;
         CageOptions {
             target: self.vertices.unwrap_or(if hull { HULL_TARGET } else { CageOptions::default().target }),
             detail: self.detail,
             quads: !self.triangles,
-            shape: if hull { Shape::Hull } else { Shape::Follow },
+            kind,
             symmetry: self.symmetry,
             per_component: self.per_component,
             clearance: self.clearance,
@@ -170,7 +182,7 @@ pub(crate) enum CageSource {
         /// Number of quads along each edge of the box.
         divisions: u32,
     },
-    /// A cage that follows the model, or its convex hull.
+    /// A generated cage of any other kind.
     Auto(CageOptions),
 }
 
@@ -183,15 +195,17 @@ impl FromStr for CageSource {
             let parsed = number.map_or(Ok(default), |n| option.parse(n));
             parsed.map_err(|wrong| format!("{what} must be {}", wrong.allowed))
         };
-        let generated = |shape, default| {
-            let target = parse("VERTICES", TARGET, default)?;
-            Ok(Self::Auto(CageOptions { target, shape, ..CageOptions::default() }))
+        let generated = |kind: CageKind| {
+            let usual = if kind == CageKind::Hull { HULL_TARGET } else { CageOptions::default().target };
+            let target = parse("VERTICES", TARGET, usual)?;
+            Ok(Self::Auto(CageOptions { target, kind, ..CageOptions::default() }))
         };
         match kind {
             "box" => Ok(Self::Box { divisions: parse("DIVISIONS", DIVISIONS, BOX_DIVISIONS)? }),
-            "auto" => generated(Shape::Follow, CageOptions::default().target),
-            "hull" => generated(Shape::Hull, HULL_TARGET),
-            _ => Ok(Self::File(PathBuf::from(text))),
+            _ => match kind.parse() {
+                Ok(kind) => generated(kind),
+                Err(_) => Ok(Self::File(PathBuf::from(text))),
+            },
         }
     }
 }
@@ -200,6 +214,20 @@ impl FromStr for CageSource {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum KindArg {
     Auto,
-    Box,
+    Skeleton,
+    Shell,
     Hull,
+    Box,
+}
+
+impl KindArg {
+    /// Kind that the generator makes; auto for a box.
+    fn generated(self) -> CageKind {
+        match self {
+            Self::Auto | Self::Box => CageKind::Auto,
+            Self::Skeleton => CageKind::Skeleton,
+            Self::Shell => CageKind::Shell,
+            Self::Hull => CageKind::Hull,
+        }
+    }
 }

@@ -35,6 +35,10 @@ fn options_without_effect_are_refused() {
         ("cage mesh.obj --margin 0.1 -o c.obj", ["--margin: only a box cage", "hint: give --kind box"]),
         ("cage mesh.obj --kind hull --divisions 3 -o c.obj", ["--divisions: only a box cage", "hint: "]),
         ("cage mesh.obj --kind box --vertices 40 -o c.obj", ["--vertices: a box cage", "hint: "]),
+        (
+            "cage mesh.obj --kind skeleton --around-clip Run -o c.obj",
+            ["--around-clip: rings", "hint: leave out"],
+        ),
         ("cage mesh.obj --divisions 3 --clearance 0.1 -o c.obj", ["--clearance: a box cage", "hint: "]),
         (
             "bind mesh.obj --cage cage.obj --preconditioner v-cycle",

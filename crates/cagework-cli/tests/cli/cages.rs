@@ -6,7 +6,10 @@ use crate::support::{CORNERS, Sandbox, box_obj, glb_json, obj_positions, sphere_
 fn generated_cage_encloses_the_model() {
     let sandbox = Sandbox::with_sphere_in_box();
     let made = sandbox.json("cage mesh.obj -o auto.obj --vertices 40 --json");
-    assert_eq!(made["kind"], "auto");
+    // A sphere has no limbs.
+    assert_eq!(made["kind"], "shell");
+    assert!(made["report"]["refusal"].as_str().unwrap().contains("no limbs"));
+    sandbox.run("cage mesh.obj -o rings.obj --kind skeleton").code(1).stderr(contains("no limbs"));
     assert!((12..=44).contains(&made["vertices"].as_u64().unwrap()));
     assert_eq!(made["report"]["target_met"], true);
     let check = sandbox.json("check auto.obj --mesh mesh.obj -g 32 --json");
@@ -20,7 +23,7 @@ fn generated_cage_encloses_the_model() {
 #[test]
 fn every_kind_of_cage_can_be_bound() {
     let sandbox = Sandbox::with_sphere_in_box();
-    for (name, at_most) in [("auto:24", 27), ("hull:16", 18), ("auto", 88), ("box:1", 8)] {
+    for (name, at_most) in [("auto:24", 27), ("shell:24", 27), ("hull:16", 18), ("auto", 88), ("box:1", 8)] {
         let bound = sandbox.json(&format!("bind mesh.obj --cage {name} -g 16 --save-cage c.obj --json"));
         assert!(bound["cage_vertices"].as_u64().unwrap() <= at_most, "{name}: {}", bound["cage_vertices"]);
         assert_eq!(bound["outside_vertices"], 0, "{name}");
@@ -125,7 +128,7 @@ fn one_cage_encloses_models_and_folders_of_models() {
     sandbox.write("clothes/notes.txt", "sizes");
     let together = "cage mesh.obj clothes -o clothes/cage.obj";
     let made = sandbox.json(&format!("{together} --vertices 60 --json"));
-    assert_eq!((&made["models"], &made["kind"]), (&3.into(), &"auto".into()));
+    assert_eq!((&made["models"], &made["kind"]), (&3.into(), &"shell".into()));
     for model in ["mesh.obj", "clothes/b.obj", "clothes/c.obj"] {
         let check = sandbox.json(&format!("check clothes/cage.obj --mesh {model} --json"));
         assert_eq!((&check["valid"], &check["encloses"]), (&true.into(), &true.into()), "{model}");

@@ -3,7 +3,8 @@
 use std::sync::LazyLock;
 
 use cagework_cage::check::{Repair, check, repair};
-use cagework_cage::generate::{CageOptions, Shape, Symmetry, generate};
+use cagework_cage::generate::{CageKind, CageOptions, Symmetry, generate};
+use cagework_cage::skeleton::Skeleton;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::mesh::Bounds;
@@ -186,7 +187,7 @@ fn as_model(model: &Model, choice: u32) {
         target: 8 + choice % 40,
         detail: if flags(15) { 0.028 } else { 0.1 },
         quads: flags(16),
-        shape: if flags(8) { Shape::Hull } else { Shape::Follow },
+        kind: if flags(8) { CageKind::Hull } else { CageKind::Shell },
         symmetry: [Symmetry::Auto, Symmetry::None, Symmetry::X, Symmetry::Z][choice as usize >> 9 & 3],
         per_component: flags(11),
         clearance: if flags(12) { 0.25 } else { 0.0 },
@@ -194,6 +195,9 @@ fn as_model(model: &Model, choice: u32) {
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
         smooth: choice >> 9 & 1,
     };
+    if let Ok(Some(rig)) = model.rest_rig() {
+        let _ = Skeleton::of_rig(&model.positions, &rig);
+    }
     if let Ok(made) = generate(&model.positions, &model.triangles, &options, &NoProgress) {
         assert_eq!(made.cage.notices(), []);
         let (smooth, options) = (options.smooth, bind_options(choice));

@@ -31,7 +31,7 @@ class CageOptions(TypedDict, total=False):
     target: int
     detail: float
     quads: bool
-    shape: Literal["follow", "hull"]
+    kind: Literal["auto", "skeleton", "shell", "hull"]
     symmetry: Literal["auto", "none", "x", "y", "z"]
     per_component: bool
     clearance: float
@@ -64,6 +64,8 @@ class Cage:
     def checked(self) -> dict[str, Any]: ...
     @property
     def report(self) -> dict[str, Any] | None: ...
+    @property
+    def rings(self) -> dict[str, Any] | None: ...
 
 @final
 class Field:
@@ -98,7 +100,12 @@ class Splats:
     def save(self, path: str | PathLike[str]) -> None: ...
 
 def generate_cage(
-    vertices: ArrayLike, triangles: ArrayLike, *, progress: _Progress = None, **options: Unpack[CageOptions]
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    rig: _Model | list[_Model] | None = None,
+    progress: _Progress = None,
+    **options: Unpack[CageOptions],
 ) -> Cage: ...
 def check_cage(
     cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int = 64, smooth: int | None = None

@@ -8,6 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::flat;
+use crate::cage::RigArrays;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{READ_LIMIT, decode};
 use crate::state::State;
@@ -181,6 +182,14 @@ impl Engine {
         let positions = Float32Array::from(flat(&positions).as_slice());
         let triangles = Uint32Array::from(triangles.as_flattened());
         Ok(Array::of2(&positions, &triangles).into())
+    }
+
+    /// Joints of all models at rest, for the positions that [`Self::model_states`] returns without a clip; undefined
+    /// without joints.
+    #[wasm_bindgen(js_name = modelRig, unchecked_return_type = "RigArrays | undefined")]
+    pub fn model_rig(&self) -> JsValue {
+        let rig = self.read(|state| state.models().rest_rig());
+        rig.map_or(JsValue::UNDEFINED, |rig| object(&RigArrays::of(&rig)))
     }
 
     /// Triangles of all models. `[n_triangles, 3]`

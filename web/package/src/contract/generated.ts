@@ -275,7 +275,19 @@ bridged?: number,
 /**
  * Sentences about gaps of the model that a generated cage closes, with settings that would keep the gaps open.
  */
-notices?: Array<string>, };
+notices?: Array<string>,
+/**
+ * Kind of a generated cage: skeleton, shell or hull.
+ */
+kind?: CageKind,
+/**
+ * Why a generated cage of the kind auto has no rings along the skeleton, one sentence.
+ */
+refusal?: string,
+/**
+ * Rings of a generated cage of the kind skeleton.
+ */
+rings?: Rings, };
 /**
  * Subdivision and inner controls of a cage.
  */
@@ -305,6 +317,10 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
  */
 quads: number, bounds: Bounds, notices: Array<string>, };
 /**
+ * Kind of a generated cage. Serde aliases are names in older project files.
+ */
+export type CageKind = "auto" | "skeleton" | "shell" | "hull";
+/**
  * Options of [`super::generate`]. Serde aliases are names in older project files.
  */
 export type CageOptions = {
@@ -323,9 +339,9 @@ detail: number,
  */
 quads: boolean,
 /**
- * Shape that the cage follows. Default follow.
+ * Kind of cage. Default auto.
  */
-shape: Shape,
+kind: CageKind,
 /**
  * Mirror symmetry. Default auto.
  */
@@ -1080,6 +1096,30 @@ mean_rel: number,
  */
 max_rel: number, };
 /**
+ * Joints of a model at rest, and their influences on its vertices.
+ */
+export type RigArrays = { names: Array<string>,
+/**
+ * Index of the parent of each joint; -1 for a root. `[n_joints]`
+ */
+parents: Array<number>,
+/**
+ * Positions of the joints, object units. `[n_joints, 3]`
+ */
+positions: Float32Array,
+/**
+ * Start of each vertex's influences in `joints` and `weights`. `[n_vertices + 1]`
+ */
+first: Uint32Array,
+/**
+ * Joint of each influence.
+ */
+joints: Uint32Array,
+/**
+ * Weight of each influence.
+ */
+weights: Float32Array, };
+/**
  * How an export treats the rig of a model.
  */
 export type RigOptions = {
@@ -1123,6 +1163,34 @@ quantize: boolean,
  * Compression of the buffers.
  */
 compress: Compression, };
+/**
+ * Place of a cage vertex in a ring.
+ */
+export type RingPlace = {
+/**
+ * Index of the chain in [`Rings::chains`].
+ */
+chain: number,
+/**
+ * Number of the ring along the chain, from 0 at the ring nearest to the parent.
+ */
+ring: number,
+/**
+ * Number of the vertex in the ring, in order around it.
+ */
+place: number, };
+/**
+ * Rings of a cage of sleeves: a ring is a closed loop of vertices around a chain of the skeleton.
+ */
+export type Rings = {
+/**
+ * Names of the chains; the first is the trunk.
+ */
+chains: Array<string>,
+/**
+ * Place of each vertex of the cage. `[n_cage]`
+ */
+places: Array<RingPlace>, };
 /**
  * Elements of the scene that are drawn, and their colours.
  */
@@ -1196,10 +1264,6 @@ notices: Array<string>, };
  * Effect of a problem on binding and its results.
  */
 export type Severity = "error" | "warning" | "note";
-/**
- * Shape that the cage follows.
- */
-export type Shape = "follow" | "hull";
 /**
  * Clips with the same name, of all models that have one.
  */
@@ -1430,7 +1494,7 @@ max_sum_error: number,
  */
 nonzeros: number, };
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
-export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
+export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
 export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};

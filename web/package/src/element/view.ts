@@ -103,7 +103,8 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     if (!cage) {
       const [positions, triangles] = engine.modelStates();
       const options = { ...CAGE_DEFAULTS, target: vertices };
-      const input = { positions, triangles, model: engine.modelPositions(), options, smooth: 0 };
+      const [rig, model] = [engine.modelRig(), engine.modelPositions()];
+      const input = { positions, triangles, rig, model, options, smooth: 0 };
       cage = await run(client.run("cage", input, ({ fraction }) => hear("Making a cage", fraction)));
     }
     engine.setCage({ ...cage, notices: [] }, undefined);

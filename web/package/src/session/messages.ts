@@ -17,6 +17,7 @@ import type {
   PullFrame,
   Reading,
   Repair,
+  RigArrays,
   RigOptions,
   UpAxis,
 } from "../contract";
@@ -83,7 +84,12 @@ export interface Jobs {
     /** `states`: append the vertices of the morph targets and, if `clip` is given, of the clip's frames. */
     input: { files: readonly NamedFile[]; states: boolean; clip: string | undefined };
     step: Reading;
-    output: { positions: Float32Array; triangles: Uint32Array; origin: Float64Array };
+    output: {
+      positions: Float32Array;
+      triangles: Uint32Array;
+      origin: Float64Array;
+      rig?: RigArrays | undefined;
+    };
   };
   /** Deforms a model's file with a posed cage. */
   reshape: {
@@ -115,6 +121,7 @@ export interface Jobs {
     input: {
       positions: Float32Array;
       triangles: Uint32Array;
+      rig: RigArrays | undefined;
       model: Float32Array;
       options: CageOptions;
       smooth: number;

@@ -133,7 +133,8 @@ function createWork(pkg: Package): Work {
       const loaded = await read(pkg, files, step);
       try {
         const [positions, triangles] = states ? loaded.states(clip) : [loaded.positions, loaded.triangles];
-        return { positions, triangles, origin: loaded.origin };
+        const rig = clip === undefined ? loaded.rig() : undefined;
+        return { positions, triangles, origin: loaded.origin, ...(rig ? { rig } : {}) };
       } finally {
         loaded.free();
       }
@@ -154,8 +155,8 @@ function createWork(pkg: Package): Work {
     async lattice({ cage, cells, options }, step) {
       return (await binder().bindLattice(cage, cells, options, step)).intoArrays();
     },
-    async cage({ positions, triangles, model, options, smooth }, step) {
-      const cage = binder().generateCage(positions, triangles, options, smooth, step);
+    async cage({ positions, triangles, rig, model, options, smooth }, step) {
+      const cage = binder().generateCage(positions, triangles, rig, options, smooth, step);
       return checked(pkg, cage, model, smooth);
     },
     read: (input, step) => readModel(pkg, input, step),
