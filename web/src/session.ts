@@ -302,10 +302,13 @@ async function start(opened: OpenResult & Needs) {
       ofNow(
         client.run("carry", { model: engine.modelPositions(), cage: engine.restPositions(), old, poses }),
       ),
-    /** Generates a cage for the model, in the worker. `clip`: name of a clip whose frames it also encloses. */
+    /**
+     * Generates a cage for the model, in the worker. `clip`: name of a clip whose frames it also encloses. The listener
+     * also gets the segments of the skeleton along which the cage is made, once.
+     */
     generateCage(
       options: CageOptions,
-      onProgress: (fraction: number) => void,
+      onProgress: (fraction: number, skeleton?: Float32Array) => void,
       clip?: string,
     ): Job<CheckedCage> {
       const input = () => {
@@ -317,7 +320,7 @@ async function start(opened: OpenResult & Needs) {
         const model = engine.modelPositions();
         return { positions, triangles, rig, model, options: { ...options, kind }, smooth };
       };
-      return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
+      return ofNow(client.run("cage", input, ({ fraction, skeleton }) => onProgress(fraction, skeleton)));
     },
     /**
      * Binds in the worker. A model that is not bound yet is first bound with the option `grid` set to 32, unless the

@@ -51,6 +51,21 @@ pub fn generate_of_kind(
     options: &CageOptions,
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
+    generate_with_skeleton(positions, triangles, rig, options, progress, &|_| ())
+}
+
+/// Like [`generate_of_kind`]. Calls `show` with the skeleton before sleeves are made along it.
+///
+/// # Errors
+/// Those of [`generate_of_kind`].
+pub fn generate_with_skeleton(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    rig: Option<&Rig>,
+    options: &CageOptions,
+    progress: &dyn Progress,
+    show: &dyn Fn(&Skeleton),
+) -> Result<GeneratedCage, CageGenError> {
     let began = progress.now_ms();
     let share = match options.kind {
         CageKind::Shell | CageKind::Hull => return generate(positions, triangles, options, progress),
@@ -59,7 +74,7 @@ pub fn generate_of_kind(
     };
     check_input(positions, triangles, options)?;
     let model = TriMesh { positions: positions.to_vec(), triangles: triangles.to_vec() };
-    let sleeves = make_sleeves(&model, rig, options, &Part { whole: progress, from: 0.0, share })?;
+    let sleeves = make_sleeves(&model, rig, options, &Part { whole: progress, from: 0.0, share }, show)?;
     let mut made = match (options.kind, sleeves) {
         (CageKind::Auto, Err(refusal)) => with_refusal(shell(&model, options, progress)?, refusal),
         (CageKind::Auto, Ok((made, skeleton))) => {
@@ -104,6 +119,7 @@ fn make_sleeves(
     rig: Option<&Rig>,
     options: &CageOptions,
     progress: &Part<'_>,
+    show: &dyn Fn(&Skeleton),
 ) -> Result<Result<(GeneratedCage, Skeleton), String>, Cancellation> {
     let usual = CageOptions::default();
     let unsupported = [
@@ -125,6 +141,7 @@ fn make_sleeves(
     if skeleton.chains.len() == 1 {
         return Ok(Err("the model has no limbs: use the kind shell".to_owned()));
     }
+    show(&skeleton);
     match sleeves::generate(&model.positions, &model.triangles, &skeleton, options.target as usize, progress)
     {
         Err(SleeveError::Cancelled(cancelled)) => Err(cancelled),

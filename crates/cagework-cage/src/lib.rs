@@ -10,7 +10,7 @@ pub mod skeleton;
 pub mod sleeves;
 
 pub use generate::{CageOptions, GeneratedCage};
-pub use kind::generate_of_kind;
+pub use kind::{generate_of_kind, generate_with_skeleton};
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 
 use cagework_cage::check::{check_smooth, repair_smooth};
 use cagework_cage::samples::{self, Sample};
-use cagework_cage::{CageOptions, GeneratedCage, generate_of_kind};
+use cagework_cage::{CageOptions, GeneratedCage, generate_with_skeleton};
 use cagework_core::field::{self, Lattice};
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::NoProgress;
@@ -18,7 +18,7 @@ use cagework_editor::{PageBindOptions, carry_poses};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use cagework_io::{Model, ModelFormat, write_mesh_glb};
 use glam::{DVec3, Vec3};
-use js_sys::Function;
+use js_sys::{Float32Array, Function};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -149,7 +149,8 @@ impl Binder {
     }
 
     /// Generates a cage whose surface after `smooth` subdivision steps encloses the model. `rig`: the model's joints
-    /// (`RigArrays`), or undefined. `progress` as for `bind`.
+    /// (`RigArrays`), or undefined. `progress` as for `bind`. `show`: called with the segments of the model's skeleton,
+    /// `[n_segments, 2, 3]`, before the cage is made along it.
     ///
     /// # Errors
     /// If the model has no triangles or an option is out of range.
@@ -162,14 +163,25 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
         smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
+        #[wasm_bindgen(unchecked_param_type = "(segments: Float32Array) => void")] show: Function,
     ) -> Answer<JsValue> {
         let options = CageOptions { smooth, ..decode(options)? };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
         let rig: Option<RigArrays> = decode(rig)?;
         let rig = rig.map(RigArrays::rig);
-        let GeneratedCage { cage, report, rings } =
-            generate_of_kind(&points(positions), &triangles, rig.as_ref(), &options, &listener)?;
+        let GeneratedCage { cage, report, rings } = generate_with_skeleton(
+            &points(positions),
+            &triangles,
+            rig.as_ref(),
+            &options,
+            &listener,
+            &|skeleton| {
+                let segments = Float32Array::from(flat(skeleton.segments().as_flattened()).as_slice());
+                // The skeleton is only shown: an exception of the callback does not concern the cage.
+                show.call1(&JsValue::NULL, &segments).ok();
+            },
+        )?;
         let bridged = if report.separate > report.parts { report.separate } else { 0 };
         let arrays = CageArrays::of(&cage.to_polygon_mesh());
         let (kind, refusal) = (Some(report.kind), report.refusal);

@@ -90,8 +90,14 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     const { cageClip } = settings;
     ctx.queue.cancel("preview");
     ctx.store.set({ cageProgress: 0 });
+    let showsSkeleton = false;
     try {
-      const hear = (cageProgress: number) => ctx.store.set({ cageProgress });
+      const hear = (cageProgress: number, skeleton?: Float32Array) => {
+        ctx.store.set({ cageProgress });
+        if (!skeleton) return;
+        engine().showLines(skeleton);
+        showsSkeleton = true;
+      };
       const made =
         previewed && isCurrent(settings)
           ? previewed.cage
@@ -102,8 +108,14 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
         const each = { label: T.cage.perPart, run: () => makeForEachPart() };
         ctx.tell.say(T.cage.bridged(made.bridged, ctx.store.get().model?.members.length ?? 1), each);
       }
-      return made;
+      const notices = [
+        ...(made.kind === "skeleton" ? [T.cage.sleeves] : []),
+        ...(made.notices ?? []),
+        ...(made.refusal === undefined ? [] : [made.refusal]),
+      ];
+      return { ...made, notices };
     } finally {
+      if (showsSkeleton) engine().showDraft(undefined);
       ctx.store.set({ cageProgress: null });
     }
   };

@@ -1,6 +1,7 @@
 /** Options of the automatic cage. */
 
 import type { App } from "../app";
+import type { CageOptions } from "../contract";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
@@ -11,6 +12,8 @@ import { fieldsOf, Segments, Select, SHARES, Slider, Toggle } from "./controls";
  * resolution.
  */
 const MIN_VOXELS = SLIDERS.voxels.min;
+/** Kinds that the panel offers; `hull` is a source of its own. */
+const FOLLOWED = ["auto", "skeleton", "shell"] as const satisfies readonly CageOptions["kind"][];
 /** Width below which gaps of the model are closed, voxels. */
 const GAP_VOXELS = 3;
 
@@ -29,6 +32,13 @@ export function Automatic({ app }: { app: App }) {
   const [detail, voxels] = [option("detail"), option("voxels")];
   return (
     <div class="stack">
+      <Segments
+        label={T.cage.follow}
+        labels={T.cage.follows}
+        tips={T.cage.followTips}
+        {...option("kind")}
+        values={FOLLOWED}
+      />
       <Slider label={T.cage.wanted} {...SLIDERS.target} format={count} {...option("target")} />
       <Slider
         label={T.cage.closeness}

@@ -124,4 +124,12 @@ impl Skeleton {
     ) -> Result<Self, SkeletonError> {
         curve::of_surface(positions, triangles, progress)
     }
+
+    /// Segments between the joints of all chains. `[n_segments]`, object units
+    #[must_use]
+    pub fn segments(&self) -> Vec<[Vec3; 2]> {
+        let pairs =
+            |chain: &Chain| chain.at.windows(2).map(|pair| [pair[0].as_vec3(), pair[1].as_vec3()]).collect();
+        self.chains.iter().flat_map(|chain| -> Vec<[Vec3; 2]> { pairs(chain) }).collect()
+    }
 }

@@ -74,6 +74,15 @@ impl Engine {
         Ok(())
     }
 
+    /// Draws line segments, `[n_segments, 2, 3]`, in place of the cage, until `showDraft` is called or the cage changes.
+    #[wasm_bindgen(js_name = showLines)]
+    pub fn show_lines(&self, segments: &[f32]) {
+        self.change(|state| {
+            state.draft = points(segments).as_chunks().0.to_vec();
+            state.is_changed = true;
+        });
+    }
+
     /// Properties of the cage for panels; undefined without a cage.
     #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
     pub fn cage_state(&self) -> JsValue {

@@ -126,7 +126,8 @@ export interface Jobs {
       options: CageOptions;
       smooth: number;
     };
-    step: Progress;
+    /** `skeleton`: segments of the model's skeleton, once, before the cage is made along it. `[n_segments, 2, 3]` */
+    step: Progress & { readonly skeleton?: Float32Array };
     output: CheckedCage;
   };
   read: {

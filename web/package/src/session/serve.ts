@@ -156,7 +156,13 @@ function createWork(pkg: Package): Work {
       return (await binder().bindLattice(cage, cells, options, step)).intoArrays();
     },
     async cage({ positions, triangles, rig, model, options, smooth }, step) {
-      const cage = binder().generateCage(positions, triangles, rig, options, smooth, step);
+      let last: Progress = { stage: "voxelize", fraction: 0, iteration: 0, delta: null };
+      const hear = (event: Progress) => {
+        last = event;
+        return step(event);
+      };
+      const show = (skeleton: Float32Array) => void step({ ...last, skeleton });
+      const cage = binder().generateCage(positions, triangles, rig, options, smooth, hear, show);
       return checked(pkg, cage, model, smooth);
     },
     read: (input, step) => readModel(pkg, input, step),

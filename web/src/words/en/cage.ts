@@ -15,6 +15,14 @@ export const cage = {
       return `A closed mesh that you made around the model, as a ${endings("disjunction")} file.`;
     },
   },
+  follow: "Drawn along",
+  follows: { auto: "Either", skeleton: "Skeleton", shell: "Surface" },
+  followTips: {
+    auto: "Sleeves of four-sided rings along arms, legs and body if they enclose the model well, otherwise its surface",
+    skeleton: "Only sleeves along the skeleton; if the model has none, the page says why",
+    shell: "The surface of the model",
+  },
+  sleeves: "Sleeves along the skeleton: a double click on a handle selects its ring.",
   wanted: "Number of vertices",
   closeness: "Closeness",
   within: (share: string) => `within ${share} of the model's size`,
