@@ -11,6 +11,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::guarded::GuardedSurface;
+use super::mirrors::Mirrors;
 use super::quadric::Quadric;
 use super::shell::Spacing;
 use cagework_core::contact::Corners;
@@ -72,7 +73,7 @@ pub(super) struct Collapser<'g, 'a> {
     /// Whether to limit the spacing of vertices on plates (thin flat parts; see [`Spacing`]).
     pub(super) keeps_plates: bool,
     /// Limit on the distance of each vertex from its neighbours, if it lies on a limb or plate.
-    spacings: Vec<Option<Spacing>>,
+    pub(super) spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
     heap: BinaryHeap<HeapEdge>,
     /// Number of vertices of the whole surface, including the mirror image.
@@ -112,8 +113,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 *plane = plane.plus(&Quadric::of_plane(p, normal));
             }
         }
-        let on_mirror = surface.on_mirror.iter().filter(|&&on| on).count();
-        let count = if surface.mirror.is_some() { 2 * n - on_mirror } else { n };
+        let count = surface.surface().n_whole();
         Self {
             surface,
             quadrics,
@@ -184,15 +184,16 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Ok(self.count)
     }
 
-    /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. A vertex on the
-    /// mirror plane remains.
+    /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. The vertex on more
+    /// mirror planes remains.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
-        if self.surface.on_mirror[b as usize] { (b, a) } else { (a, b) }
+        let n_planes = |v: u32| self.surface.on_mirror[v as usize].len();
+        if n_planes(b) >= n_planes(a) && n_planes(b) > 0 { (b, a) } else { (a, b) }
     }
 
-    /// Returns the mirror axis if the merged vertex must lie on the mirror plane.
-    fn pinned(&self, kept: u32) -> Option<usize> {
-        self.surface.mirror.filter(|_| self.surface.on_mirror[kept as usize])
+    /// Returns the mirror planes on which the merged vertex must lie.
+    fn pinned(&self, kept: u32) -> Mirrors {
+        self.surface.on_mirror[kept as usize]
     }
 
     fn merged_quadric(&self, a: u32, b: u32) -> Quadric {
@@ -205,10 +206,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         let (kept, _) = self.ordered(a, b);
         let pinned = self.pinned(kept);
         let [p, q] = [a, b].map(|v| self.surface.positions[v as usize]);
-        let mut middle = 0.5 * (p + q);
-        if let Some(axis) = pinned {
-            middle[axis] = 0.0;
-        }
+        let middle = pinned.project(0.5 * (p + q));
         let reach = 1.5 * (p - q).length() + 0.5;
         self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
     }
@@ -222,14 +220,14 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.heap.push(HeapEdge { cost, edge, version });
     }
 
-    /// Whether the surface remains a manifold (and, with a mirror, half of one) when the edge is collapsed: the link
+    /// Whether the surface remains a manifold (and, with mirrors, part of one) when the edge is collapsed: the link
     /// condition (Dey et al. 1999).
     fn is_allowed(&mut self, a: u32, b: u32) -> bool {
+        let swapped = self.ordered(a, b).0 == b;
         let Scratch { near_a, near_b, .. } = &mut self.scratch;
         let surface = &*self.surface;
         surface.neighbours(a, near_a);
         surface.neighbours(b, near_b);
-        let on_mirror = |v: u32| surface.on_mirror[v as usize];
         let around = surface.around[a as usize].iter().map(|&t| surface.triangles[t as usize]);
         let sides: Vec<u32> = around
             .filter(|t| t.contains(&b))
@@ -242,32 +240,29 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if near_a.len() + near_b.len() - 2 - common > MAX_VALENCE {
             return false;
         }
-        if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
+        // Each vertex opposite the edge loses a triangle.
+        if sides.iter().any(|&tip| surface.needs_all(tip)) {
             return false;
         }
-        // Each vertex opposite the edge loses a triangle. A corner of a solid needs at least three triangles; on the
-        // mirror plane, two of this half suffice.
-        let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
-        if sides.iter().any(|&tip| surface.around[tip as usize].len() <= least(tip)) {
+        let (kept, gone) = if swapped { (b, a) } else { (a, b) };
+        let [on_kept, on_gone] = [kept, gone].map(|v| surface.on_mirror[v as usize]);
+        // A vertex may not leave its mirror planes, and only an edge of the border lies in one.
+        if !on_gone.without(on_kept).is_empty() || (!on_gone.is_empty() && sides.len() != 1) {
             return false;
         }
-        let (kept, gone) = if on_mirror(b) { (b, a) } else { (a, b) };
-        if !on_mirror(kept) {
-            return true;
+        // The collapse must not create an inner edge between two vertices of a mirror plane: its image would be the same
+        // edge.
+        let (near_kept, near_gone) = if swapped { (&*near_b, &*near_a) } else { (&*near_a, &*near_b) };
+        let is_new = |v: u32| v != kept && near_kept.binary_search(&v).is_err();
+        if near_gone.iter().any(|&v| is_new(v) && surface.common(v, kept) != surface.common(v, gone)) {
+            return false;
         }
-        if !on_mirror(gone) {
-            // The collapse must not create an edge between two vertices of the mirror plane: its image would be the
-            // same edge.
-            let (near_kept, near_gone) = if kept == a { (&*near_a, &*near_b) } else { (&*near_b, &*near_a) };
-            if near_gone.iter().any(|&v| v != kept && on_mirror(v) && near_kept.binary_search(&v).is_err()) {
-                return false;
-            }
-        }
-        // A triangle may not lie in the mirror plane.
-        surface.around[gone as usize]
-            .iter()
-            .map(|&t| surface.triangles[t as usize])
-            .all(|t| t.contains(&kept) || !t.iter().all(|&i| i == gone || on_mirror(i)))
+        // A triangle may not lie in a mirror plane.
+        surface.around[gone as usize].iter().map(|&t| surface.triangles[t as usize]).all(|t| {
+            let others = t.iter().filter(|&&i| i != gone);
+            t.contains(&kept)
+                || others.fold(on_kept, |on, &i| on.and(surface.on_mirror[i as usize])).is_empty()
+        })
     }
 
     fn place_of(&mut self, a: u32, b: u32) -> Option<(DVec3, f64)> {
@@ -293,21 +288,18 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
         let quadric = self.merged_quadric(a, b);
         let pinned = self.pinned(kept);
-        if let Some(axis) = pinned {
-            outward[axis] = 0.0;
-        }
-        let outward = outward.normalize_or_zero();
+        let outward = pinned.project(outward).normalize_or_zero();
         let optimum = self.optimum(a, b);
         let [p, q] = [kept, gone].map(|v| self.surface.positions[v as usize]);
-        let middle =
-            if pinned.is_some() && !self.surface.on_mirror[gone as usize] { p } else { 0.5 * (p + q) };
+        let is_movable = pinned == self.surface.on_mirror[gone as usize];
+        let middle = if is_movable { 0.5 * (p + q) } else { p };
         let mut candidates = Vec::with_capacity(2 * NORMAL_OFFSETS.len() + 2);
         for push in NORMAL_OFFSETS {
             candidates.push(optimum + push * outward);
             candidates.push(middle + push * outward);
         }
         candidates.push(p);
-        if pinned.is_none() || self.surface.on_mirror[gone as usize] {
+        if is_movable {
             candidates.push(q);
         }
         candidates.retain(|&c| !self.surface.is_blocked(c));
@@ -351,9 +343,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
         let is_off = |budget: f64| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
         let is_too_far = |spacing: &Spacing| {
-            let length = |d: DVec3| spacing.along.map_or_else(|| d.length(), |along| along.dot(d).abs());
             let star = self.scratch.star.iter().flat_map(|(corners, _)| corners.index.iter().zip(corners.at));
-            star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| length(p - at) > spacing.distance)
+            star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| spacing.is_below(p - at))
         };
         let spacings = || [a, b].into_iter().filter_map(|v| self.spacings[v as usize].as_ref());
         self.budget.is_some_and(is_off)
@@ -373,8 +364,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         let (kept, gone) = self.ordered(a, b);
         self.planes[kept as usize] = self.planes[a as usize].plus(&self.planes[b as usize]);
         self.spacings[kept as usize] = self.spacing_of(a, b);
-        let (axis, both) = (self.surface.mirror, self.surface.on_mirror[gone as usize]);
-        self.count -= if axis.is_some() && !both { 2 } else { 1 };
+        self.count -= 1 << self.surface.mirrors.without(self.surface.on_mirror[gone as usize]).len();
         self.surface.merge(kept, gone, at);
         self.quadrics[kept as usize] = self.merged_quadric(a, b);
         self.version[kept as usize] += 1;

@@ -25,7 +25,7 @@ const MIN_DEPTH: f64 = 1.0;
 const MIN_OPEN_WIDTH: f64 = 4.0;
 
 /// Smallest area of a gap for which the lattice is refined, as a fraction of the squared longest side of the model.
-const MIN_GAP_AREA: f64 = 0.003;
+pub(super) const MIN_GAP_AREA: f64 = 0.003;
 
 /// Aspect ratios of a voxel: length divided by thickness across narrow gaps. The second is used if the first would need
 /// a resolution above [`MAX_RESOLUTION`].

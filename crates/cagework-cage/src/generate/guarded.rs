@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::buckets::Buckets;
 use super::footprint::any_run;
+use super::mirrors::Mirrors;
 use super::surface::Surface;
 use super::voxels::Voxels;
 use cagework_core::contact::{Corners, meet};
@@ -59,8 +60,8 @@ pub(super) struct GuardedSurface<'a> {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Triangles around each vertex; empty for removed vertices.
     pub(super) around: Vec<Vec<u32>>,
-    pub(super) on_mirror: Vec<bool>,
-    pub(super) mirror: Option<usize>,
+    pub(super) on_mirror: Vec<Mirrors>,
+    pub(super) mirrors: Mirrors,
     /// Whether folds sharper than [`MIN_FOLD_COSINE`] are allowed.
     pub(super) may_fold: bool,
     obstacle: &'a Obstacle,
@@ -88,7 +89,7 @@ impl<'a> GuardedSurface<'a> {
             positions: surface.positions,
             triangles: surface.triangles,
             on_mirror: surface.on_mirror,
-            mirror: surface.mirror,
+            mirrors: surface.mirrors,
             may_fold: false,
             obstacle,
             keep_out: obstacle.voxels.clone(),
@@ -161,7 +162,7 @@ impl<'a> GuardedSurface<'a> {
     /// Returns the current surface without unused indices.
     pub(super) fn surface(&self) -> Surface {
         let mut number = vec![u32::MAX; self.positions.len()];
-        let mut surface = Surface { mirror: self.mirror, ..Surface::default() };
+        let mut surface = Surface { mirrors: self.mirrors, ..Surface::default() };
         for (v, _) in self.around.iter().enumerate().filter(|(_, around)| !around.is_empty()) {
             number[v] = surface.positions.len() as u32;
             surface.positions.push(self.positions[v]);
@@ -212,9 +213,10 @@ impl<'a> GuardedSurface<'a> {
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
         let others: Vec<Corners> = others.iter().map(real).collect();
         let across = |t: &Corners| {
-            let axis = self.mirror?;
-            let is_beside = t.index.iter().filter(|&&i| self.on_mirror[i as usize]).count() == 2;
-            is_beside.then(|| 1.0 - 2.0 * t.normal().normalize_or_zero()[axis].powi(2))
+            let (index, normal) = (t.index, t.normal().normalize_or_zero());
+            let is_in = move |axis: usize, i: u32| self.on_mirror[i as usize].has(axis);
+            let beside = move |&axis: &usize| index.iter().filter(|&&i| is_in(axis, i)).count() == 2;
+            self.mirrors.axes().filter(beside).map(move |axis| 1.0 - 2.0 * normal[axis].powi(2))
         };
         let folds = triangles.iter().enumerate().flat_map(|(k, t)| {
             let beside = triangles[..k].iter().chain(&others);
@@ -228,11 +230,12 @@ impl<'a> GuardedSurface<'a> {
     /// [`Self::may_fold`], they must not be folded more sharply than both [`MIN_FOLD_COSINE`] and the replaced
     /// triangles.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
-        if let Some(axis) = self.mirror {
-            let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
-            if new.iter().any(|t| t.index.iter().zip(t.at).any(|(&i, p)| !beside(i, p))) {
-                return false;
-            }
+        let is_beside = |i: u32, p: DVec3| {
+            let mut off = self.mirrors.without(self.on_mirror[i as usize]).axes();
+            off.all(|axis| p[axis] >= MIN_MIRROR_DISTANCE)
+        };
+        if new.iter().any(|t| t.index.iter().zip(t.at).any(|(&i, p)| !is_beside(i, p))) {
+            return false;
         }
         // Candidate positions of one vertex mostly fail at the same triangle: test that triangle first.
         let mut order = (0..new.len()).map(|k| (k + self.last_unclear) % new.len());
@@ -323,15 +326,23 @@ impl<'a> GuardedSurface<'a> {
         let mut around = self.around[a as usize].iter().copied();
         let other = around.find(|&u| u != t && self.triangles[u as usize].contains(&b))?;
         let d = self.triangles[other as usize].into_iter().find(|&i| i != a && i != b)?;
-        let on_mirror = |v: u32| self.on_mirror[v as usize];
-        let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
         let joined = self.around[c as usize].iter().any(|&u| self.triangles[u as usize].contains(&d));
-        let is_needed = |v: u32| self.around[v as usize].len() <= least(v);
-        if c == d || joined || (on_mirror(c) && on_mirror(d)) || is_needed(a) || is_needed(b) {
+        if c == d || joined || !self.common(c, d).is_empty() || self.needs_all(a) || self.needs_all(b) {
             return None;
         }
         let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| self.positions[i as usize]) };
         Some((other, [[a, d, c], [d, b, c]].map(corners)))
+    }
+
+    /// The mirror planes on which both vertices lie.
+    pub(super) fn common(&self, a: u32, b: u32) -> Mirrors {
+        self.on_mirror[a as usize].and(self.on_mirror[b as usize])
+    }
+
+    /// Whether a vertex has only as many triangles as the corner of a solid needs: three, and one less for each mirror
+    /// plane on which it lies.
+    pub(super) fn needs_all(&self, v: u32) -> bool {
+        self.around[v as usize].len() <= 3 - self.on_mirror[v as usize].len() as usize
     }
 
     /// Flips the common edge of the two triangles `pair`, which become `new`.

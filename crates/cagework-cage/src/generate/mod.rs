@@ -17,6 +17,7 @@ mod footprint;
 mod gaps;
 mod guarded;
 mod lattice;
+mod mirrors;
 mod options;
 mod pairing;
 mod quadric;
@@ -44,13 +45,14 @@ use gaps::NarrowGaps;
 use guarded::GuardedSurface;
 pub(crate) use guarded::MIN_FOLD_COSINE;
 use lattice::{Lattice, MARGIN_VOXELS};
+use mirrors::Mirrors;
 pub use options::{
     BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageKind, CageOptions, CageReport, DETAIL, DIVISIONS,
     GeneratedCage, HULL_TARGET, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, RingPlace, Rings,
     Symmetry, TARGET, VOXELS,
 };
 use quads::Faces;
-use shell::Shell;
+use shell::{Shell, Spacing};
 use soup::Soup;
 use verify::{verify_faces, verify_surface};
 
@@ -59,6 +61,10 @@ const MAX_LATTICES: usize = 4;
 
 /// A coarser lattice is tried if a cage has more than this multiple of the target number of vertices.
 const MAX_TARGET_RATIO: f64 = 1.1;
+
+/// A cage that is symmetric in one plane only is preferred if the cage with all planes of the model has more than this
+/// multiple of its vertices.
+const MIN_SAVING: f64 = 1.4;
 
 /// Layers of voxels around the hull to which the cage is confined, tried in this order until the target is met. Narrow
 /// bands keep the cage from spanning gaps; `None` does not confine it.
@@ -150,9 +156,10 @@ fn generate_plain(
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
+    let mirrors = shell::find_mirrors(&soup, bounds, affordable, options, &go_on)?;
     let components = match (options.per_component, options.kind) {
         (true, kind) if kind != CageKind::Hull => {
-            let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), options, &go_on);
+            let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), mirrors, options, &go_on);
             Components::find(|n| Ok(shell(n)?.separate), [base, affordable], target)?
         }
         _ => Components::ONE,
@@ -166,9 +173,10 @@ fn generate_plain(
             let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
             if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
         };
-        let mut shell = Shell::new(positions, triangles, bounds, (voxels, stretch), options, &|share| {
-            go_on(Stage::Voxelize, 0.4 * share)
-        })?;
+        let mut shell =
+            Shell::new(positions, triangles, bounds, (voxels, stretch), mirrors, options, &|share| {
+                go_on(Stage::Voxelize, 0.4 * share)
+            })?;
         // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
         // lattice closes them.
         let may_coarsen = attempt < MAX_LATTICES && voxels > least;
@@ -182,7 +190,7 @@ fn generate_plain(
             shell.find_gaps(&soup, [voxels, most_gaps]);
         }
         let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
-        let (cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {
+        let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {
             Simplification::Cage(cage, hull) => (*cage, hull),
             Simplification::TooMany(left) => {
                 let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
@@ -191,6 +199,20 @@ fn generate_plain(
                 continue;
             }
         };
+        if mirrors.len() > 1 {
+            // Corners at the crossings of several mirror planes may cost vertices.
+            let first = mirrors.first();
+            let of_one =
+                Shell::new(positions, triangles, bounds, (voxels, stretch), first, options, &|_| {
+                    simplify(0.0)
+                })?;
+            if let Simplification::Cage(other, false) =
+                simplify_hull(&of_one, options, may_coarsen, &simplify)?
+                && other.n_vertices() as f64 * MIN_SAVING < cage.n_vertices() as f64
+            {
+                (cage, shell) = (*other, of_one);
+            }
+        }
         let parts = n_parts(&cage);
         let coarser = (options.voxels > 0 && voxels < first).then(|| {
             format!(
@@ -212,7 +234,7 @@ fn generate_plain(
             voxels: voxels as u32,
             voxel_size: shell.lattice.cell as f32,
             clearance: shell.clearance as f32,
-            mirror: shell.hull.mirror.map(Mirror::of_axis),
+            mirror: shell.hull.mirrors.axes().next().map(Mirror::of_axis),
             notices: notices.collect(),
             parts,
             separate: shell.separate as u32,
@@ -305,7 +327,8 @@ fn simplify_hull(
         // Convert to voxels of the lattice of `first_voxels`, so that relaxation weighs distance against shape in the
         // same way on every lattice.
         let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
-        if let Some(cage) = relax_and_verify(shell, guarded, &quadrics, options.quads, go_on)? {
+        let limits = budget.filter(|_| options.quads).map(|budget| (budget, collapser.spacings));
+        if let Some(cage) = relax_and_verify(shell, guarded, &quadrics, limits, go_on)? {
             return Ok(Simplification::Cage(Box::new(cage), false));
         }
         target = left.max(target) * 2;
@@ -320,21 +343,33 @@ fn simplify_hull(
 }
 
 /// Relaxes a collapsed surface, pairs triangles into quads where the result passes verification, and returns the cage.
+/// `limits`: distance in voxels and spacings within which vertices on mirror planes are removed; `None` for triangles
+/// only.
 fn relax_and_verify(
     shell: &Shell,
     mut guarded: GuardedSurface<'_>,
     quadrics: &[quadric::Quadric],
-    of_quads: bool,
+    limits: Option<(f64, Vec<Option<Spacing>>)>,
     go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<Option<Cage>, Cancellation> {
     let collapsed = guarded.surface();
     unfold::unfold(&mut guarded, false);
     relax::relax(&mut guarded, quadrics, &|share| go_on(0.6 + 0.2 * share))?;
     let triangles = guarded.surface();
-    if of_quads {
+    if let Some((budget, spacings)) = limits {
         let mut pairing = quads::quads(&mut guarded, quadrics, &|share| go_on(0.8 + 0.2 * share))?;
+        let needless = quads::needless_planes(&guarded, &pairing, budget, &spacings);
+        let without = || quads::faces(&guarded, &pairing, needless);
+        if !needless.is_empty()
+            && let Some(cage) = without().and_then(|f| verify_faces(shell, &f.positions, f.faces).ok())
+        {
+            return Ok(Some(cage));
+        }
         for _ in 0..MAX_SPLIT_ROUNDS {
-            let Faces { positions, faces, first } = quads::faces(&guarded, &pairing);
+            let Some(Faces { positions, faces, first }) = quads::faces(&guarded, &pairing, Mirrors::NONE)
+            else {
+                break;
+            };
             match verify_faces(shell, &positions, faces) {
                 Ok(cage) => return Ok(Some(cage)),
                 Err(wrong) if wrong.is_empty() => break,

@@ -5,10 +5,11 @@
 use glam::DVec3;
 
 use super::guarded::GuardedSurface;
+use super::mirrors::Mirrors;
 use cagework_core::contact::Corners;
 
-/// Corners of a quad: a vertex, and whether the corner is the vertex's mirror image.
-pub(super) type Quad = [(u32, bool); 4];
+/// Corners of a quad: a vertex, and the planes in which it is mirrored.
+pub(super) type Quad = [(u32, Mirrors); 4];
 
 /// Smallest allowed cosine between the normals of a quad's two triangles, for either diagonal. A sharper crease is
 /// therefore a border between quads.
@@ -28,8 +29,8 @@ pub(super) enum Partner {
     /// No partner.
     #[default]
     None,
-    /// The triangle's own mirror image: the quad crosses the mirror plane.
-    Image,
+    /// The triangle's own image in the mirror plane normal to an axis, which the quad crosses.
+    Image(usize),
     /// Another triangle.
     Triangle(u32),
 }
@@ -42,13 +43,7 @@ pub(super) struct Pairing {
 }
 
 pub(super) fn places(surface: &GuardedSurface<'_>, quad: &Quad) -> [DVec3; 4] {
-    quad.map(|(v, is_image)| {
-        let mut p = surface.positions[v as usize];
-        if let (true, Some(axis)) = (is_image, surface.mirror) {
-            p[axis] = -p[axis];
-        }
-        p
-    })
+    quad.map(|(v, image)| image.reflect(surface.positions[v as usize]))
 }
 
 /// Computes the deviation of a quad from a plane: the distance between its diagonals, divided by its mean side.
@@ -80,16 +75,16 @@ pub(super) fn quad_of(surface: &GuardedSurface<'_>, t: u32, partner: Partner) ->
     };
     match partner {
         Partner::None => None,
-        Partner::Image => {
-            let on_mirror = |v: u32| surface.on_mirror[v as usize];
-            let [a, b, c] = edge(&|a, b, c| on_mirror(a) && on_mirror(b) && !on_mirror(c))?;
-            Some([(a, false), (c, true), (b, false), (c, false)])
+        Partner::Image(axis) => {
+            let [a, b, c] = edge(&|a, b, _| surface.common(a, b).has(axis))?;
+            let image = Mirrors::of_axis(axis);
+            Some([(a, Mirrors::NONE), (c, image), (b, Mirrors::NONE), (c, Mirrors::NONE)])
         }
         Partner::Triangle(u) => {
             let y = surface.triangles[u as usize];
             let [a, b, c] = edge(&|a, b, _| y.contains(&a) && y.contains(&b))?;
             let d = y.into_iter().find(|&i| i != a && i != b)?;
-            Some([a, d, b, c].map(|v| (v, false)))
+            Some([a, d, b, c].map(|v| (v, Mirrors::NONE)))
         }
     }
 }
@@ -112,11 +107,10 @@ pub(super) fn is_free(surface: &mut GuardedSurface<'_>, t: u32, partner: Partner
 pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f64 {
     let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
     let [_, (b, _), _, (d, _)] = quad;
-    let on_mirror = |v: u32| surface.on_mirror[v as usize];
     let joined =
         |v: u32| surface.around[b as usize].iter().any(|&t| surface.triangles[t as usize].contains(&v));
     // The other diagonal must not be an edge already.
-    if partner != Partner::Image && (joined(d) || on_mirror(b) && on_mirror(d)) {
+    if !matches!(partner, Partner::Image(_)) && (joined(d) || !surface.common(b, d).is_empty()) {
         return 0.0;
     }
     let p = places(surface, &quad);
@@ -131,7 +125,7 @@ pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f
     }
     let worth = 0.25 + 1.0 / (1.0 + badness) + 0.3 * fold;
     // The quad lies in both halves of the surface, so each half counts half of its weight.
-    if partner == Partner::Image { 0.5 * worth } else { worth }
+    if matches!(partner, Partner::Image(_)) { 0.5 * worth } else { worth }
 }
 
 /// Pairs triangles to maximise the total weight, starting from `before`. `strict`: allows only quads that may be cut
@@ -146,7 +140,8 @@ pub(super) fn pair(surface: &mut GuardedSurface<'_>, before: &Pairing, strict: b
             let (a, b) = (x[k], x[(k + 1) % 3]);
             let mut others = surface.around[a as usize].iter().copied();
             let other = others.find(|&u| u != t && surface.triangles[u as usize].contains(&b));
-            let partner = other.map_or(Partner::Image, Partner::Triangle);
+            let across = || surface.common(a, b).axes().next().map_or(Partner::None, Partner::Image);
+            let partner = other.map_or_else(across, Partner::Triangle);
             let worth = worth(surface, t, partner);
             if worth > 0.0 && (!strict || is_free(surface, t, partner)) {
                 near[t as usize].push((partner, worth));
@@ -211,7 +206,7 @@ impl Pairing {
         let mut left = Vec::new();
         let both = match partner {
             Partner::Triangle(u) => vec![t, u],
-            Partner::Image | Partner::None => vec![t],
+            Partner::Image(_) | Partner::None => vec![t],
         };
         for &x in &both {
             let old = self.partner[x as usize];
@@ -234,7 +229,7 @@ impl Pairing {
             }
             let is_free = |partner: Partner| match partner {
                 Partner::Triangle(y) => self.partner[y as usize] == Partner::None,
-                Partner::Image | Partner::None => true,
+                Partner::Image(_) | Partner::None => true,
             };
             let free = near[x as usize].iter().copied().filter(|option| is_free(option.0));
             if let Some((other, worth)) = free.max_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -264,6 +259,13 @@ impl Pairing {
             }
             taken.push(diagonal);
         }
+    }
+
+    /// Whether an edge is a side of a face, not the diagonal of a quad.
+    pub(super) fn is_side(&self, surface: &GuardedSurface<'_>, v: u32, w: u32) -> bool {
+        let has_both = |t: u32| [v, w].iter().all(|i| surface.triangles[t as usize].contains(i));
+        let mut around = surface.around[v as usize].iter().filter(|&&t| has_both(t));
+        around.all(|&t| !matches!(self.partner[t as usize], Partner::Triangle(u) if has_both(u)))
     }
 
     pub(super) fn part(&mut self, t: u32) {

@@ -3,6 +3,8 @@
 
 use glam::{DMat3, DVec3};
 
+use super::mirrors::Mirrors;
+
 /// Weight of the squared distance to a vertex's original position, relative to the weight of the squared distances to
 /// planes. It keeps the triangles of flat parts evenly sized.
 const POINT_WEIGHT: f64 = 0.004;
@@ -75,11 +77,10 @@ impl Quadric {
         self.at(p).powi(2) / self.area.max(1e-12)
     }
 
-    /// Returns the point at which the quadric is minimal, restricted to `p[axis] = 0` if an axis is given; `None` if
-    /// there is no single minimum.
-    pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
+    /// Returns the point on the planes `pinned` at which the quadric is minimal; `None` if there is no single minimum.
+    pub(super) fn minimum(&self, pinned: Mirrors) -> Option<DVec3> {
         let (mut a, mut b) = (self.a, self.b);
-        if let Some(axis) = on_mirror {
+        for axis in pinned.axes() {
             for k in 0..3 {
                 a.col_mut(axis)[k] = 0.0;
                 a.col_mut(k)[axis] = 0.0;

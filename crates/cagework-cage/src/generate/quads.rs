@@ -5,10 +5,12 @@ use glam::DVec3;
 
 use super::collapse::quality;
 use super::guarded::GuardedSurface;
+use super::mirrors::Mirrors;
 use super::pairing::{
     Pairing, Partner, Quad, badness, is_free, other_cut, pair, places, quad_of, warp, worth,
 };
 use super::quadric::Quadric;
+use super::shell::Spacing;
 use super::unfold::unfold;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancellation;
@@ -112,7 +114,7 @@ impl Star {
         let mut goals = Vec::new();
         let mut corners = Vec::new();
         for quad in &self.quads {
-            let Some(k) = quad.iter().position(|&corner| corner == (v, false)) else { continue };
+            let Some(k) = quad.iter().position(|&corner| corner == (v, Mirrors::NONE)) else { continue };
             let p = places(surface, quad);
             let [before, next, opposite] = [3, 1, 2].map(|step| p[(k + step) % 4]);
             corners.push(before + next - opposite);
@@ -125,7 +127,7 @@ impl Star {
         let mut near = Vec::new();
         surface.neighbours(v, &mut near);
         goals.push(near.iter().map(|&w| surface.positions[w as usize]).sum::<DVec3>() / near.len() as f64);
-        let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+        let pinned = surface.on_mirror[v as usize];
         if let Some(home) = quadric.minimum(pinned) {
             goals.push(here + (home - here).clamp_length_max(2.0));
         }
@@ -144,16 +146,13 @@ fn straighten(surface: &mut GuardedSurface<'_>, pairing: &Pairing, quadrics: &[Q
     }
     let star = Star::new(surface, pairing, v);
     let (quadric, here) = (&quadrics[v as usize], surface.positions[v as usize]);
-    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let pinned = surface.on_mirror[v as usize];
     let limit = star.energy(surface, quadric, v) + star.penalty(surface) - MIN_DECREASE;
     let before: Vec<Corners> = star.all.iter().map(|&t| surface.corners(t)).collect();
     let mut better: Vec<(f64, DVec3)> = Vec::new();
     for goal in star.goals(surface, quadric, v) {
         for step in STEP_SHARES {
-            let mut at = here + step * (goal - here);
-            if let Some(axis) = pinned {
-                at[axis] = 0.0;
-            }
+            let at = pinned.project(here + step * (goal - here));
             surface.positions[v as usize] = at;
             let energy = star.energy(surface, quadric, v);
             if energy < limit {
@@ -204,67 +203,131 @@ fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
     }
 }
 
-/// Faces of the whole surface, including the mirror image.
+/// Faces of the whole surface, including all images.
 pub(super) struct Faces {
     pub(super) positions: Vec<DVec3>,
     pub(super) faces: Vec<Vec<u32>>,
-    /// For each face, one of the triangles of the half surface that the face was made from. `[n_faces]`
+    /// For each face, one of the triangles of the guarded surface that the face was made from. `[n_faces]`
     pub(super) first: Vec<u32>,
 }
 
-/// Builds the faces of the whole surface, with quads for paired triangles.
-pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
+/// Corners of a face, and the mirror planes that it crosses, in which it is its own image.
+struct Face {
+    corners: Vec<(u32, Mirrors)>,
+    crossed: Mirrors,
+}
+
+impl Face {
+    /// Merges a quad that has one side in a mirror plane with its image, and so removes the two corners in the plane. A
+    /// face without corner in the plane is returned as it is; `None` if another face has one.
+    fn merged(mut self, surface: &GuardedSurface<'_>, axis: usize) -> Option<Self> {
+        let is_in = |k: usize| surface.on_mirror[self.corners[k % self.corners.len()].0 as usize].has(axis);
+        let n = self.corners.len();
+        let count = (0..n).filter(|&k| is_in(k)).count();
+        if count > 0 {
+            let k = (0..n).find(|&k| (n, count) == (4, 2) && is_in(k) && is_in(k + 1))?;
+            let [q, p] = [2, 3].map(|step| self.corners[(k + step) % n]);
+            let plane = Mirrors::of_axis(axis);
+            let [q_image, p_image] = [q, p].map(|(v, image)| (v, image.xor(plane)));
+            self = Self { corners: vec![q, p, p_image, q_image], crossed: self.crossed.or(plane) };
+        }
+        Some(self)
+    }
+}
+
+/// Finds the mirror planes whose vertices are not needed: all faces around them are quads that can be merged with their
+/// images ([`Face::merged`]), and the edges across the plane are within `budget` (voxels) of these vertices and no longer
+/// than `spacings` allow.
+pub(super) fn needless_planes(
+    surface: &GuardedSurface<'_>,
+    pairing: &Pairing,
+    budget: f64,
+    spacings: &[Option<Spacing>],
+) -> Mirrors {
+    let is_needed = |axis: usize, v: u32| {
+        let mut near = Vec::new();
+        surface.neighbours(v, &mut near);
+        let beside = near.iter().filter(|&&w| !surface.on_mirror[w as usize].has(axis));
+        let is_far = |&w: &u32| {
+            let p = surface.positions[w as usize];
+            let foot = Mirrors::of_axis(axis).project(p);
+            let spacings = [v, w].into_iter().filter_map(|v| spacings[v as usize]);
+            foot.distance(surface.positions[v as usize]) > budget
+                || spacings.into_iter().any(|spacing| spacing.is_below(2.0 * (p - foot)))
+        };
+        beside.copied().filter(|w| pairing.is_side(surface, v, *w)).any(|w| is_far(&w))
+    };
+    surface.mirrors.axes().fold(Mirrors::NONE, |planes, axis| {
+        let wider = planes.or(Mirrors::of_axis(axis));
+        let on =
+            |v: &u32| surface.on_mirror[*v as usize].has(axis) && !surface.around[*v as usize].is_empty();
+        let is_needless = (0..surface.positions.len() as u32).filter(on).all(|v| !is_needed(axis, v));
+        if is_needless && merged_faces(surface, pairing, wider).is_some() { wider } else { planes }
+    })
+}
+
+/// Builds the faces of the guarded surface, with quads for paired triangles, each with the triangle it was made from.
+/// Faces at the planes `needless` are merged with their images; `None` if one cannot.
+fn merged_faces(
+    surface: &GuardedSurface<'_>,
+    pairing: &Pairing,
+    needless: Mirrors,
+) -> Option<Vec<(Face, u32)>> {
+    let mut faces = Vec::new();
+    for t in (0..surface.triangles.len() as u32).filter(|&t| surface.is_alive(t)) {
+        let partner = pairing.partner[t as usize];
+        let quad = quad_of(surface, t, partner).filter(|quad| {
+            let p = places(surface, quad);
+            // The other diagonal of a quad across a mirror has not been checked; in a planar quad, both diagonals give
+            // the same surface.
+            let is_guarded =
+                !matches!(partner, Partner::Image(_)) || p[0].distance(p[2]) <= p[1].distance(p[3]);
+            is_guarded || warp(&p) <= MAX_PLANAR_WARP
+        });
+        let (corners, crossed) = match (quad, partner) {
+            // The quad was added with the first of its triangles.
+            (Some(_), Partner::Triangle(u)) if u < t => continue,
+            (Some(quad), Partner::Image(axis)) => (quad.to_vec(), Mirrors::of_axis(axis)),
+            (Some(quad), _) => (quad.to_vec(), Mirrors::NONE),
+            (None, _) => (surface.triangles[t as usize].map(|v| (v, Mirrors::NONE)).to_vec(), Mirrors::NONE),
+        };
+        let face = Face { corners, crossed };
+        faces.push((needless.axes().try_fold(face, |face, axis| face.merged(surface, axis))?, t));
+    }
+    Some(faces)
+}
+
+/// Builds the faces of the whole surface, without the vertices on the planes `needless`. `None` if they are needed.
+pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing, needless: Mirrors) -> Option<Faces> {
     let mut positions = Vec::new();
-    // New indices of each vertex and of its mirror image.
-    let mut number = vec![[u32::MAX; 2]; surface.positions.len()];
+    // New indices of the images of each vertex, one for each subset of the mirror planes.
+    let mut number = vec![[u32::MAX; 8]; surface.positions.len()];
     for (v, &p) in surface.positions.iter().enumerate() {
-        if surface.around[v].is_empty() {
+        if surface.around[v].is_empty() || !surface.on_mirror[v].and(needless).is_empty() {
             continue;
         }
-        number[v] = [positions.len() as u32; 2];
-        positions.push(p);
-        if let Some(axis) = surface.mirror.filter(|_| !surface.on_mirror[v]) {
-            number[v][1] = positions.len() as u32;
-            let mut image = p;
-            image[axis] = -p[axis];
-            positions.push(image);
+        for image in surface.mirrors.without(surface.on_mirror[v]).subsets() {
+            number[v][image.0 as usize] = positions.len() as u32;
+            positions.push(image.reflect(p));
         }
     }
-    let of = |corners: &[(u32, bool)], is_image: bool| {
-        let numbers = corners.iter().map(|&(v, image)| number[v as usize][usize::from(image != is_image)]);
+    let of = |corners: &[(u32, Mirrors)], image: Mirrors| {
+        let numbers = corners.iter().map(|&(v, of)| {
+            let image = of.xor(image).without(surface.on_mirror[v as usize]);
+            number[v as usize][image.0 as usize]
+        });
         let mut face: Vec<u32> = numbers.collect();
-        if is_image {
+        if image.len() % 2 == 1 {
             face.reverse();
         }
         face
     };
     let (mut faces, mut first) = (Vec::new(), Vec::new());
-    for t in (0..surface.triangles.len() as u32).filter(|&t| surface.is_alive(t)) {
-        let partner = pairing.partner[t as usize];
-        let quad = quad_of(surface, t, partner).filter(|quad| {
-            let p = places(surface, quad);
-            // The other diagonal of a quad across the mirror has not been checked; in a planar quad, both diagonals
-            // give the same surface.
-            let is_guarded = partner != Partner::Image || p[0].distance(p[2]) <= p[1].distance(p[3]);
-            is_guarded || warp(&p) <= MAX_PLANAR_WARP
-        });
-        let corners: Vec<(u32, bool)> = match (quad, partner) {
-            // The quad was added with the first of its triangles.
-            (Some(_), Partner::Triangle(u)) if u < t => continue,
-            (Some(quad), Partner::Image) => {
-                faces.push(of(&quad, false));
-                first.push(t);
-                continue;
-            }
-            (Some(quad), _) => quad.to_vec(),
-            (None, _) => surface.triangles[t as usize].map(|v| (v, false)).to_vec(),
-        };
-        faces.push(of(&corners, false));
-        first.push(t);
-        if surface.mirror.is_some() {
-            faces.push(of(&corners, true));
+    for (face, t) in merged_faces(surface, pairing, needless)? {
+        for image in surface.mirrors.without(face.crossed).subsets() {
+            faces.push(of(&face.corners, image));
             first.push(t);
         }
     }
-    Faces { positions, faces, first }
+    Some(Faces { positions, faces, first })
 }

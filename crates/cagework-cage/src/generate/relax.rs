@@ -75,15 +75,12 @@ fn slide(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], v: u32) {
     surface.neighbours(v, &mut near);
     let mean = near.iter().map(|&w| surface.positions[w as usize]).sum::<DVec3>() / near.len() as f64;
     let tangential = (mean - p) - normal * normal.dot(mean - p);
-    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let pinned = surface.on_mirror[v as usize];
     let home = quadric.minimum(pinned).map_or(DVec3::ZERO, |o| (o - p).clamp_length_max(2.0));
     let energy = fit(quadric, p) + shape(star.iter());
     for direction in [home + tangential, tangential, home, normal * normal.dot(home), mean - p] {
         for step in STEP_SHARES {
-            let mut q = p + step * direction;
-            if let Some(axis) = pinned {
-                q[axis] = 0.0;
-            }
+            let q = pinned.project(p + step * direction);
             let moved: Vec<Corners> = star.iter().map(|t| t.with_corner(v, q)).collect();
             if fit(quadric, q) + shape(moved.iter()) > energy - MIN_DECREASE {
                 continue;

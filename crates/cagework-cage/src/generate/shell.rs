@@ -8,9 +8,10 @@ use std::collections::VecDeque;
 
 use glam::{DVec3, Vec3};
 
-use super::gaps::{Gap, gaps};
+use super::gaps::{Gap, MIN_GAP_AREA, gaps};
 use super::guarded::{GuardedSurface, Obstacle};
 use super::lattice::{Lattice, MARGIN_VOXELS};
+use super::mirrors::Mirrors;
 use super::soup::Soup;
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
@@ -23,6 +24,10 @@ const MIN_MIRROR_SHARE: f64 = 0.985;
 /// Distance up to which a voxel counts as the mirror image of another one, as a fraction of the model's longest side;
 /// at least one voxel.
 const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
+
+/// Number of voxels along the model's longest side of the lattice on which symmetry is tested. It does not depend on the
+/// number of vertices, so that all cages of a model have the same symmetry.
+const MIRROR_VOXELS: usize = 64;
 
 /// Largest extent of a cluster of voxels without mirror image, as a fraction of the model's longest side. A larger
 /// cluster counts as an asymmetric part.
@@ -40,7 +45,7 @@ const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
 /// The hull around a vertex counts as a limb if its length along the longest chord, divided by its mean thickness
 /// across this chord, exceeds this.
-const MIN_LIMB_RATIO: f64 = 2.2;
+const MIN_LIMB_RATIO: f64 = 2.8;
 
 /// A direction counts as across a limb or plate if its cosine with the longest chord is below this.
 const MAX_ACROSS_COSINE: f64 = 0.3;
@@ -60,8 +65,10 @@ const MIN_PLATE_WIDTH: f64 = 0.5;
 /// vertices may enlarge the distance.
 const MAX_PLATE_SPACING: f64 = 0.5;
 
-/// The spacing of vertices on plates is limited only if at least this share of the hull's vertices lies on plates.
-const MIN_PLATE_SHARE: f64 = 0.25;
+/// The spacing of vertices on limbs is limited only if at least this share of the hull's vertices lies on limbs, and that
+/// of vertices on plates only if this share lies on plates. Furniture, such as a chair of a seat, a back and four legs,
+/// needs neither.
+const MIN_SHARE: f64 = 0.6;
 
 /// Directions of the chords that measure length and thickness of limbs and plates: to the 26 neighbours on the lattice,
 /// one of each opposite pair.
@@ -89,6 +96,13 @@ pub(super) struct Spacing {
     pub(super) along: Option<DVec3>,
     /// Largest distance, voxels.
     pub(super) distance: f64,
+}
+
+impl Spacing {
+    /// Whether neighbours that differ by `d` are too far apart.
+    pub(super) fn is_below(&self, d: DVec3) -> bool {
+        self.along.map_or_else(|| d.length(), |along| along.dot(d).abs()) > self.distance
+    }
 }
 
 /// A solid in a lattice and the hull around it.
@@ -125,6 +139,7 @@ impl Shell {
         triangles: &[[u32; 3]],
         bounds: [DVec3; 2],
         (n, stretch): (usize, DVec3),
+        mirrors: Mirrors,
         options: &CageOptions,
         go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
     ) -> Result<Self, Cancellation> {
@@ -140,28 +155,21 @@ impl Shell {
             _ => lattice.voxelize(positions, triangles, &|f| go_on(0.5 * f))?,
         };
         let mut solid = touched.filled();
-        let mirror = if stretch == DVec3::ONE {
-            find_mirror(&solid, n, options.symmetry)
-        } else {
-            let cubes = Lattice::around(bounds, n, DVec3::ONE, MARGIN_VOXELS);
-            find_mirror(&cubes.voxelize(positions, triangles, go_on)?.filled(), n, options.symmetry)
-        };
-        if let Some(axis) = mirror {
-            let image = solid.mirrored(axis);
-            solid.unite(&image);
+        if !mirrors.is_empty() {
+            mirrors.complete(&mut solid);
             solid = solid.filled();
         }
         go_on(0.6)?;
-        let mut hull = dilate_hull(&solid, layers, mirror);
+        let mut hull = dilate_hull(&solid, layers, mirrors);
         let separate = hull.parts().len();
         if !options.per_component {
-            while bridge(&mut solid, &hull, layers, mirror) {
+            while bridge(&mut solid, &hull, layers, mirrors) {
                 go_on(0.7)?;
-                hull = dilate_hull(&solid, layers, mirror);
+                hull = dilate_hull(&solid, layers, mirrors);
             }
         }
         go_on(0.8)?;
-        let stairs = Surface::of(&hull, mirror);
+        let stairs = Surface::of(&hull, mirrors);
         let filled = hull;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
         // Dilate the obstacle by the whole voxels of the clearance; the rest, less than a voxel, is a distance that
@@ -241,11 +249,13 @@ impl Shell {
             }
         };
         let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
-        let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
-        let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
-        // If only a few vertices are classified as plate, they lie where wires cross: drop their limits.
-        if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
-            spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
+        for is_plate in [false, true] {
+            let is_of_kind =
+                |s: &Option<Spacing>| s.is_some_and(|spacing| spacing.along.is_none() == is_plate);
+            let n = spacings.iter().filter(|&spacing| is_of_kind(spacing)).count();
+            if (n as f64) < MIN_SHARE * spacings.len() as f64 {
+                spacings.iter_mut().filter(|spacing| is_of_kind(spacing)).for_each(|spacing| *spacing = None);
+            }
         }
         spacings
     }
@@ -262,14 +272,14 @@ impl Shell {
 }
 
 /// Dilates the solid by `layers` voxels, fills cavities, and makes the boundary a 2-manifold.
-fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
+fn dilate_hull(solid: &Voxels, layers: usize, mirrors: Mirrors) -> Voxels {
     let mut hull = solid.clone();
     for _ in 0..layers {
         hull = hull.dilated();
     }
     hull = hull.filled();
     loop {
-        hull.compose(mirror);
+        hull.compose(mirrors);
         // The added voxels may enclose a cavity: fill it, and repeat.
         let filled = hull.filled();
         if filled == hull {
@@ -298,38 +308,69 @@ fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     }
 }
 
-/// Finds the axis of the mirror: the requested one, or the first of x, z, y along which the solid is symmetric up to
-/// scattered voxels. `longest`: number of voxels along the model's longest side.
-fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
-    match symmetry {
-        Symmetry::None => None,
-        Symmetry::X => Some(0),
-        Symmetry::Y => Some(1),
-        Symmetry::Z => Some(2),
-        Symmetry::Auto => [0, 2, 1].into_iter().find(|&axis| {
-            let tolerance = (MIRROR_TOLERANCE * longest as f64).round().max(1.0) as usize;
-            let image = (0..tolerance).fold(solid.mirrored(axis), |image, _| image.dilated());
-            let unmatched = solid.without(&image);
-            let most = (1.0 - MIN_MIRROR_SHARE) * solid.count() as f64;
-            let extent = |island: &Vec<[usize; 3]>| {
-                let side = |k: usize| {
-                    let at = || island.iter().map(|v| v[k]);
-                    at().max().unwrap_or(0) - at().min().unwrap_or(0)
-                };
-                (0..3).map(side).max().unwrap_or(0)
-            };
-            unmatched.count() as f64 <= most
-                && unmatched
-                    .islands()
-                    .iter()
-                    .all(|island| (extent(island) as f64) < MAX_UNMATCHED_SHARE * longest as f64)
-        }),
+/// Finds the mirror planes: the requested one, or the first of x, z, y in which the model is symmetric up to
+/// [`MIRROR_TOLERANCE`], and the others in which it is symmetric up to one voxel. In both cases, small scattered parts may
+/// differ, unless the image of such a part would close a gap. `finest`: limit on the number of voxels along the model's
+/// longest side.
+///
+/// # Errors
+/// If `go_on` cancels.
+pub(super) fn find_mirrors(
+    soup: &Soup<'_>,
+    bounds: [DVec3; 2],
+    finest: usize,
+    options: &CageOptions,
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<Mirrors, Cancellation> {
+    match options.symmetry {
+        Symmetry::Auto => {}
+        Symmetry::None => return Ok(Mirrors::NONE),
+        Symmetry::X => return Ok(Mirrors::of_axis(0)),
+        Symmetry::Y => return Ok(Mirrors::of_axis(1)),
+        Symmetry::Z => return Ok(Mirrors::of_axis(2)),
     }
+    let n = MIRROR_VOXELS.min(finest);
+    let lattice = Lattice::around(bounds, n, DVec3::ONE, MARGIN_VOXELS);
+    let touched = match options.kind {
+        CageKind::Hull => slab_hull(&lattice, soup.positions),
+        _ => lattice.voxelize(soup.positions, soup.triangles, go_on)?,
+    };
+    let solid = touched.filled();
+    let mut sheets = None;
+    let mut is_symmetric = |axis: usize, tolerance: usize| {
+        let image = (0..tolerance).fold(solid.mirrored(axis), |image, _| image.dilated());
+        let unmatched = solid.without(&image);
+        let extent = |island: &Vec<[usize; 3]>| {
+            let side = |k: usize| {
+                let at = || island.iter().map(|v| v[k]);
+                at().max().unwrap_or(0) - at().min().unwrap_or(0)
+            };
+            (0..3).map(side).max().unwrap_or(0)
+        };
+        let is_small = |island: &Vec<[usize; 3]>| (extent(island) as f64) < MAX_UNMATCHED_SHARE * n as f64;
+        unmatched.count() as f64 <= (1.0 - MIN_MIRROR_SHARE) * solid.count() as f64
+            && unmatched.islands().iter().all(is_small)
+            && !unmatched.mirrored(axis).meets(sheets.get_or_insert_with(|| large_sheets(&solid, n)))
+    };
+    let tolerance = (MIRROR_TOLERANCE * n as f64).round().max(1.0) as usize;
+    Ok(Mirrors::ALL.axes().fold(Mirrors::NONE, |mirrors, axis| {
+        let tolerance = if mirrors.is_empty() { tolerance } else { 1 };
+        if is_symmetric(axis, tolerance) { mirrors.or(Mirrors::of_axis(axis)) } else { mirrors }
+    }))
+}
+
+/// Returns the sheets of the large gaps of a solid. `n`: number of voxels along the model's longest side.
+fn large_sheets(solid: &Voxels, n: usize) -> Voxels {
+    let mut sheets = Voxels::new(solid.dims);
+    let found = gaps(solid, solid, (MAX_GAP_HALF * n as f64).ceil() as usize);
+    let large = found.iter().filter(|gap| gap.area >= MIN_GAP_AREA * (n * n) as f64);
+    large.flat_map(|gap| &gap.voxels).for_each(|&v| sheets.add(v));
+    sheets
 }
 
 /// Adds to the solid paths of voxels that join the components of the hull, shortest first (breadth-first search from
 /// the joined set). The paths will be dilated by `layers`. Returns false if there is only one component.
-fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize>) -> bool {
+fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirrors: Mirrors) -> bool {
     let parts = hull.parts();
     if parts.len() < 2 {
         return false;
@@ -370,10 +411,7 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
             left -= 1;
         }
     }
-    if let Some(axis) = mirror {
-        let image = solid.mirrored(axis);
-        solid.unite(&image);
-    }
+    mirrors.complete(solid);
     true
 }
 

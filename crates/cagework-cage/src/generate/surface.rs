@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::mirrors::Mirrors;
 use super::voxels::Voxels;
 
 /// Limit on the movement of a smoothed vertex along each axis, in voxels. The hull is one voxel away from the solid;
@@ -11,27 +12,27 @@ pub(super) const SMOOTHING_REACH: f64 = 0.45;
 /// Number of smoothing rounds; eight flatten the stairs of a slanted plane.
 const SMOOTHING_ROUNDS: usize = 8;
 
-/// A closed, outward surface in centred voxel units; or, with a mirror, its half on the positive side, bounded by the
-/// mirror plane.
+/// A closed, outward surface in centred voxel units; or, with mirror planes, its part on their positive sides, which
+/// they bound. The images of this part in all subsets of the planes make up the whole surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Whether each vertex lies on the mirror plane.
-    pub(super) on_mirror: Vec<bool>,
-    pub(super) mirror: Option<usize>,
+    /// The mirror planes on which each vertex lies. `[n_vertices]`
+    pub(super) on_mirror: Vec<Mirrors>,
+    pub(super) mirrors: Mirrors,
 }
 
 impl Surface {
     /// Extracts the boundary of a well-composed voxel set.
-    pub(super) fn of(voxels: &Voxels, mirror: Option<usize>) -> Self {
+    pub(super) fn of(voxels: &Voxels, mirrors: Mirrors) -> Self {
         let dims = voxels.dims;
         let corners = dims.map(|n| n + 1);
         let half = DVec3::from_array(dims.map(|n| 0.5 * n as f64));
         let mut number = vec![u32::MAX; corners.iter().product()];
-        let mut surface = Self { mirror, ..Self::default() };
+        let mut surface = Self { mirrors, ..Self::default() };
         voxels.for_each(|voxel| {
-            if mirror.is_some_and(|axis| voxel[axis] < dims[axis] / 2) {
+            if mirrors.axes().any(|axis| voxel[axis] < dims[axis] / 2) {
                 return;
             }
             for side in 0..6 {
@@ -63,7 +64,8 @@ impl Surface {
                         *slot = surface.positions.len() as u32;
                         let p = DVec3::from_array(corner.map(|x| x as f64)) - half;
                         surface.positions.push(p);
-                        surface.on_mirror.push(mirror.is_some_and(|axis| p[axis] == 0.0));
+                        let on = (0..3).filter(|&axis| p[axis] == 0.0).fold(0, |on, axis| on | 1 << axis);
+                        surface.on_mirror.push(mirrors.and(Mirrors(on)));
                     }
                     *slot
                 });
@@ -92,38 +94,35 @@ impl Surface {
             }
             for (v, p) in self.positions.iter_mut().enumerate() {
                 let reach = DVec3::splat(SMOOTHING_REACH);
-                let mut moved = (sum[v] / count[v].max(1.0)).clamp(stairs[v] - reach, stairs[v] + reach);
-                if let (Some(axis), true) = (self.mirror, self.on_mirror[v]) {
-                    moved[axis] = 0.0;
-                }
-                *p = moved;
+                let moved = (sum[v] / count[v].max(1.0)).clamp(stairs[v] - reach, stairs[v] + reach);
+                *p = self.on_mirror[v].project(moved);
             }
         }
     }
 
-    /// Number of vertices of the whole surface, including the mirror image.
+    /// Number of vertices of the whole surface, including the images.
     pub(super) fn n_whole(&self) -> usize {
-        let on_mirror = self.on_mirror.iter().filter(|&&on| on).count();
-        if self.mirror.is_some() { 2 * self.positions.len() - on_mirror } else { self.positions.len() }
+        self.on_mirror.iter().map(|&on| 1 << self.mirrors.without(on).len()).sum()
     }
 
-    /// The whole surface: both halves joined at the mirror plane.
+    /// The whole surface: all images, joined at the mirror planes.
     pub(super) fn whole(&self) -> Self {
-        let Some(axis) = self.mirror else { return self.clone() };
-        let mut whole = Self { mirror: None, ..self.clone() };
-        let mut image = Vec::with_capacity(self.positions.len());
-        for (v, &p) in self.positions.iter().enumerate() {
-            if self.on_mirror[v] {
-                image.push(v as u32);
-            } else {
-                image.push(whole.positions.len() as u32);
-                let mut q = p;
-                q[axis] = -q[axis];
-                whole.positions.push(q);
+        let mut whole = Self { mirrors: Mirrors::NONE, ..self.clone() };
+        for axis in self.mirrors.axes() {
+            let mut image = Vec::with_capacity(whole.positions.len());
+            for v in 0..whole.positions.len() {
+                if whole.on_mirror[v].has(axis) {
+                    image.push(v as u32);
+                } else {
+                    image.push(whole.positions.len() as u32);
+                    whole.positions.push(Mirrors::of_axis(axis).reflect(whole.positions[v]));
+                    whole.on_mirror.push(whole.on_mirror[v]);
+                }
             }
+            let images = whole.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|i| image[i as usize]));
+            let images: Vec<_> = images.collect();
+            whole.triangles.extend(images);
         }
-        whole.on_mirror = vec![false; whole.positions.len()];
-        whole.triangles.extend(self.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|i| image[i as usize])));
         whole
     }
 }

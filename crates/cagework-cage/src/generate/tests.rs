@@ -1,6 +1,6 @@
 use std::ops::ControlFlow;
 
-use glam::{DVec3, Vec3, vec3};
+use glam::{DVec3, Vec2, Vec3, vec3};
 use proptest::prelude::*;
 
 use super::{
@@ -130,6 +130,12 @@ fn ring() -> Soup {
         vec3(cos, 0.0, sin)
     };
     tube(&(0..48).map(circle).collect::<Vec<_>>(), 0.15, true)
+}
+
+fn cuboid(size: Vec3, center: Vec3) -> Soup {
+    let bounds = Bounds { min: center - 0.5 * size, max: center + 0.5 * size };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    (cage.positions().to_vec(), cage.triangles().to_vec())
 }
 
 #[test]
@@ -265,18 +271,35 @@ fn limbs_get_rings_and_compact_models_few_vertices() {
     heights.sort_by(f32::total_cmp);
     let widest = heights.windows(2).map(|w| w[1] - w[0]).fold(0.0, f32::max);
     assert!(widest < 2.5, "rings are {widest} apart");
-    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
-    let cube = subdivided_box(bounds, 0.0, [1; 3]);
-    let triangles = cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
-    assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
+    assert!(make(&cuboid(Vec3::ONE, Vec3::ZERO), &options(80)).report.vertices <= 12);
+}
+
+/// Limits on vertices and on the share of quads for shapes that a person would enclose with few quads.
+#[test]
+fn simple_shapes_get_few_vertices_and_mostly_quads() {
+    let cube = cuboid(Vec3::ONE, Vec3::ZERO);
+    let corner = |k: u8| 0.3 * Vec2::from_angle(std::f32::consts::TAU * f32::from(k) / 48.0);
+    let positions = (0..48).map(corner).flat_map(|p| [p.extend(-1.0), p.extend(1.0)]);
+    let side = |k: u32| [2 * k, 2 * k + 1, (2 * k + 2) % 96, (2 * k + 3) % 96];
+    let cylinder: Soup = (
+        positions.chain([-Vec3::Z, Vec3::Z]).collect(),
+        (0..48).map(side).flat_map(|[a, b, c, d]| [[a, c, b], [c, d, b], [a, 96, c], [b, d, 97]]).collect(),
+    );
+    let legs = [(-0.42, -0.42), (-0.42, 0.42), (0.42, -0.42), (0.42, 0.42)];
+    let leg = |(x, z)| cuboid(vec3(0.12, 1.0, 0.12), vec3(x, -0.5, z));
+    let seat = [cuboid(vec3(1.0, 0.1, 1.0), Vec3::ZERO), cuboid(vec3(1.0, 1.0, 0.1), vec3(0.0, 0.5, -0.45))];
+    let chair = join(seat.into_iter().chain(legs.map(leg)));
+    for (soup, most, least) in [(cube, 12, 90), (cylinder, 24, 70), (chair, 56, 70)] {
+        let report = make(&soup, &options(80)).report;
+        assert!(report.vertices <= most, "{report:?}");
+        assert!(100 * report.quads >= least * report.faces, "{report:?}");
+    }
 }
 
 /// A cage can bend a plate only with vertices in the middle of both sides.
 #[test]
 fn plates_have_vertices_in_the_middle() {
-    let bounds = Bounds { min: vec3(-1.0, -0.04, -0.8), max: vec3(1.0, 0.04, 0.8) };
-    let plate = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
-    let made = make(&(plate.positions().to_vec(), plate.triangles().to_vec()), &options(80));
+    let made = make(&cuboid(vec3(2.0, 0.08, 1.6), Vec3::ZERO), &options(80));
     for side in [-1.0, 1.0] {
         let is_in_the_middle = |p: &&Vec3| p.y * side > 0.0 && p.x.hypot(p.z) < 0.6;
         let n = made.cage.positions().iter().filter(is_in_the_middle).count();
@@ -308,16 +331,49 @@ fn folds_stay_below_120_degrees_for_either_cut_of_quads() {
     }
 }
 
+/// Asserts that mirroring maps the vertices of a cage onto vertices and its faces onto faces.
+fn assert_symmetric(cage: &Cage, axis: usize) {
+    let (points, center) = (cage.positions(), cage.bounds().center());
+    let image = |&p: &Vec3| {
+        let mut image = p;
+        image[axis] = 2.0 * center[axis] - p[axis];
+        let next = (0..points.len())
+            .min_by(|&k, &l| points[k].distance(image).total_cmp(&points[l].distance(image)))
+            .unwrap();
+        let off = points[next].distance(image);
+        assert!(off < ROUNDING, "axis {axis}: {p} has no image: the next is {off} away");
+        next as u32
+    };
+    let images: Vec<u32> = points.iter().map(image).collect();
+    let sorted = |face: &mut dyn Iterator<Item = u32>| {
+        let mut face: Vec<u32> = face.collect();
+        face.sort_unstable();
+        face
+    };
+    let faces: Vec<_> = cage.faces().iter().map(|face| sorted(&mut face.iter().copied())).collect();
+    for face in &faces {
+        let image = sorted(&mut face.iter().map(|&v| images[v as usize]));
+        assert!(faces.contains(&image), "axis {axis}: face {face:?} has no image");
+    }
+}
+
+#[test]
+fn cages_are_symmetric_in_every_plane_in_which_the_model_is() {
+    let sphere = Cage::new(&subdivided_box(Bounds { min: -Vec3::ONE, max: Vec3::ONE }, 0.0, [6; 3])).unwrap();
+    let sphere = (sphere.positions().iter().map(|p| p.normalize()).collect(), sphere.triangles().to_vec());
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let sheet = (corners.map(|[x, z]| vec3(x, 0.0, z)).to_vec(), vec![[0, 2, 1], [0, 3, 2]]);
+    for soup in [sphere, sheet, ring()] {
+        let cage = make(&soup, &options(80)).cage;
+        (0..3).for_each(|axis| assert_symmetric(&cage, axis));
+    }
+}
+
 #[test]
 fn symmetric_model_gets_a_symmetric_cage() {
     let made = make(&trousers(), &options(80));
     assert_eq!(made.report.mirror, Some(Mirror::X));
-    let (points, center) = (made.cage.positions(), made.cage.bounds().center());
-    for p in points {
-        let image = vec3(2.0 * center.x - p.x, p.y, p.z);
-        let off = points.iter().map(|q| q.distance(image)).fold(f32::MAX, f32::min);
-        assert!(off < ROUNDING, "{p} has no image: the next is {off} away");
-    }
+    assert_symmetric(&made.cage, 0);
     let without = CageOptions { symmetry: Symmetry::None, ..options(80) };
     assert_eq!(make(&trousers(), &without).report.mirror, None);
 }

@@ -81,14 +81,11 @@ fn shift(surface: &mut GuardedSurface<'_>, v: u32, all_ways: bool) -> bool {
         directions.extend(star.iter().map(|t| -t.normal()));
         directions.extend(ways.iter().flat_map(|&way| [way, -way]));
     }
-    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let pinned = surface.on_mirror[v as usize];
     let mut better = Vec::new();
     for direction in directions {
         for step in STEP_SHARES {
-            let mut at = here + step * length * direction.normalize_or_zero();
-            if let Some(axis) = pinned {
-                at[axis] = 0.0;
-            }
+            let at = pinned.project(here + step * length * direction.normalize_or_zero());
             let moved: Vec<Corners> = star.iter().map(|t| t.with_corner(v, at)).collect();
             let spoils = |(before, after): (&Corners, &Corners)| {
                 let (m, n) = (before.normal(), after.normal());
@@ -113,6 +110,7 @@ fn shift(surface: &mut GuardedSurface<'_>, v: u32, all_ways: bool) -> bool {
 mod tests {
     use super::*;
     use crate::generate::guarded::Obstacle;
+    use crate::generate::mirrors::Mirrors;
     use crate::generate::surface::Surface;
     use crate::generate::voxels::Voxels;
 
@@ -124,7 +122,8 @@ mod tests {
             [[2, 2], [-2, 2], [-2, -2], [2, -2]].map(|[x, y]| DVec3::new(x.into(), y.into(), 0.0));
         let positions = positions.into_iter().chain([0.3, -0.3].map(|z| z * DVec3::Z)).collect();
         let triangles = (0..4).flat_map(|k| [[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]).collect();
-        let surface = Surface { positions, triangles, on_mirror: vec![false; 6], mirror: None };
+        let surface =
+            Surface { positions, triangles, on_mirror: vec![Mirrors::NONE; 6], mirrors: Mirrors::NONE };
         let obstacle = Obstacle { voxels: Voxels::new([16; 3]), clearance: 0.0, stretch: DVec3::ONE };
         let mut guarded = GuardedSurface::new(surface, &obstacle);
         let excess = |guarded: &GuardedSurface<'_>| {

@@ -1,5 +1,7 @@
 //! Sets of voxels as bit arrays, with morphological operations. Each line of voxels along x starts with a new word.
 
+use super::mirrors::Mirrors;
+
 /// Bits per word.
 const WORD: usize = u64::BITS as usize;
 
@@ -79,6 +81,11 @@ impl Voxels {
     /// Returns the voxels of this set that are not in `other`, a set in the same box.
     pub(super) fn without(&self, other: &Self) -> Self {
         Self { bits: self.bits.iter().zip(&other.bits).map(|(a, b)| a & !b).collect(), ..*self }
+    }
+
+    /// Whether the two sets, in the same box, have a voxel in common.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0)
     }
 
     /// Returns the mirror image about the middle of `axis`.
@@ -188,7 +195,7 @@ impl Voxels {
     /// bounding box is filled. Terminates because voxels are only added, within the set's bounding box.
     ///
     /// Well-composedness: Latecki 1997, "3D well-composed pictures". The repair is our own.
-    pub(super) fn compose(&mut self, mirror: Option<usize>) {
+    pub(super) fn compose(&mut self, mirrors: Mirrors) {
         let critical: Vec<bool> = (0..256).map(is_critical).collect();
         loop {
             let mut changed = false;
@@ -197,14 +204,11 @@ impl Voxels {
                     changed |= self.compose_row(y, z, &critical);
                 }
             }
-            if let (true, Some(axis)) = (changed, mirror) {
-                // Which voxels are added depends on the order of blocks, so add their mirror images, too.
-                let other = self.mirrored(axis);
-                self.unite(&other);
-            }
             if !changed {
                 return;
             }
+            // Which voxels are added depends on the order of blocks, so add their mirror images, too.
+            mirrors.complete(self);
         }
     }
 
