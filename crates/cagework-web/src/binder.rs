@@ -156,14 +156,13 @@ impl Binder {
     /// If the model has no triangles or an option is out of range.
     #[wasm_bindgen(js_name = generateCage, unchecked_return_type = "CageArrays")]
     pub fn generate_cage(
-        &self,
         positions: &[f32],
         triangles: &[u32],
         #[wasm_bindgen(unchecked_param_type = "RigArrays | undefined")] rig: JsValue,
         #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
         smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-        #[wasm_bindgen(unchecked_param_type = "(segments: Float32Array) => void")] show: Function,
+        #[wasm_bindgen(unchecked_param_type = "(segments: Float32Array) => void")] show: &Function,
     ) -> Answer<JsValue> {
         let options = CageOptions { smooth, ..decode(options)? };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();

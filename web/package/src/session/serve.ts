@@ -162,7 +162,7 @@ function createWork(pkg: Package): Work {
         return step(event);
       };
       const show = (skeleton: Float32Array) => void step({ ...last, skeleton });
-      const cage = binder().generateCage(positions, triangles, rig, options, smooth, hear, show);
+      const cage = pkg.Binder.generateCage(positions, triangles, rig, options, smooth, hear, show);
       return checked(pkg, cage, model, smooth);
     },
     read: (input, step) => readModel(pkg, input, step),
