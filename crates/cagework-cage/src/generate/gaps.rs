@@ -4,9 +4,10 @@
 use glam::{DVec3, Vec3};
 
 use super::lattice::{Lattice, MARGIN_VOXELS};
+use super::mirrors::Mirrors;
 use super::soup::Soup;
 use super::voxels::Voxels;
-use super::{CageOptions, MAX_VOXELS};
+use super::{CageOptions, MAX_TARGET, MAX_VOXELS, VERTICES_PER_GAP};
 use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancellation;
@@ -26,6 +27,10 @@ const MIN_OPEN_WIDTH: f64 = 4.0;
 
 /// Smallest area of a gap for which the lattice is refined, as a fraction of the squared longest side of the model.
 pub(super) const MIN_GAP_AREA: f64 = 0.003;
+
+/// Smallest area of a gap that is reported, and for which the lattice is refined if the cage has enough vertices for all
+/// gaps of that area.
+const MIN_SMALL_GAP_AREA: f64 = 0.0015;
 
 /// Aspect ratios of a voxel: length divided by thickness across narrow gaps. The second is used if the first would need
 /// a resolution above [`MAX_RESOLUTION`].
@@ -57,8 +62,11 @@ const MAX_STRETCHED_SHARE: f64 = 0.66;
 /// Number of sample points of a sheet at which a cage is tested for closing the gap.
 const SAMPLES: usize = 32;
 
+/// A solid voxel.
+type Wall = [u16; 3];
+
 /// Marks a voxel that has no solid voxel within the search distance.
-const NO_WALL: u32 = u32::MAX;
+const NO_WALL: Wall = [u16::MAX; 3];
 
 #[derive(Clone, Debug)]
 pub(super) struct Gap {
@@ -74,9 +82,11 @@ pub(super) struct Gap {
     across: DVec3,
 }
 
-/// A large gap of the model.
+/// A gap of the model.
 #[derive(Clone, Debug)]
 pub(super) struct ModelGap {
+    /// Area of the gap's sheet as a fraction of the squared longest side of the model.
+    pub(super) area: f64,
     /// Sample points of the gap's sheet, object units.
     points: Vec<Vec3>,
     /// Mean distance between the walls, object units.
@@ -85,24 +95,29 @@ pub(super) struct ModelGap {
     across: DVec3,
     /// Smallest number of cubic voxels along the model's longest side with which the gap stays open.
     least_voxels: f64,
-    /// Smallest number of voxels of the chosen lattice along the model's longest side with which the gap stays open.
-    pub(super) voxels: usize,
 }
 
 /// Narrow gaps of a model, and a lattice that resolves them.
 #[derive(Debug)]
 pub(super) struct NarrowGaps {
+    /// Gaps that a cage with few voxels closes or nearly closes, largest first.
     pub(super) gaps: Vec<ModelGap>,
+    /// Number of the first of `gaps` for which the lattice is refined.
+    pub(super) n_kept: usize,
+    /// Whether cages keep gaps open: false if the large gaps alone are too many.
+    pub(super) keeps: bool,
+    /// Number of handles of the model on the finest lattice; `usize::MAX` if not counted.
+    pub(super) handles: usize,
     /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
     /// Number of voxels along the model's longest side.
     pub(super) voxels: usize,
 }
 
-/// Finds the large gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a
-/// lattice that leaves them open. With more than `most` gaps, the lattice has `base` cubic voxels instead. Gaps
-/// narrower than twice the `clearance` of the cage from the model (object units) are left out, because they close on
-/// any lattice.
+/// Finds the gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a lattice
+/// that leaves the largest `most` of them open: all gaps if there are at most a third of `most`, otherwise only the large ones. With
+/// more than `most` large gaps, the lattice has `base` cubic voxels instead. Gaps narrower than twice the `clearance` of
+/// the cage from the model (object units) are left out, because they close on any lattice.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -115,15 +130,19 @@ pub(super) fn narrow_gaps(
 ) -> Result<NarrowGaps, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let solid = lattice.voxelize(soup.positions, soup.triangles, go_on)?.filled();
+    let mut composed = solid.clone();
+    composed.compose(Mirrors::NONE);
+    let handles = (composed.parts().len() as isize - composed.euler()).max(0) as usize;
     let n = MAX_VOXELS as f64;
     let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| {
-        gap.area >= MIN_GAP_AREA * n * n
+        gap.area >= MIN_SMALL_GAP_AREA * n * n
             && gap.width * lattice.cell > 2.0 * clearance
             && !gap.is_hollow(&lattice, soup)
     });
     let of_model = |gap: Gap| ModelGap {
+        area: gap.area / (n * n),
         points: gap
             .voxels
             .iter()
@@ -133,22 +152,30 @@ pub(super) fn narrow_gaps(
         width: gap.width * lattice.cell,
         across: gap.across,
         least_voxels: MIN_OPEN_WIDTH * n / gap.width,
-        voxels: 0,
     };
-    let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
-    let mut stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
-    let mut voxels = base;
+    let found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
+    let n_large = found.iter().filter(|gap| gap.area >= MIN_GAP_AREA).count();
+    // Handles need vertices, too: those of hair cards (hundreds) are too many. For small gaps, the lattice is refined only if vertices abound.
+    let fits = |&(n, room): &(usize, usize)| n <= room && handles <= 2 * most;
+    let kept = [(found.len(), most / 3), (n_large, most)].into_iter().find(fits);
+    let (n_kept, keeps) = (kept.map_or(0, |(n, _)| n), kept.is_some());
+    let mut narrow = NarrowGaps { gaps: found, n_kept, keeps, handles, stretch: DVec3::ONE, voxels: base };
+    if n_kept == 0 {
+        return Ok(narrow);
+    }
+    let kept = &mut narrow.gaps[..n_kept];
+    let mut stretch = stretch(kept, base);
     if stretch != DVec3::ONE {
         let resolution = resolution_of_narrows(soup, bounds, (clearance, stretch), go_on)?;
         if resolution > MAX_RESOLUTION {
             stretch = stretch.map(|times| if times > 1.0 { STRETCHES[1] } else { 1.0 });
         }
-        voxels = voxels.max((resolution / stretch.max_element()).ceil() as usize);
+        narrow.voxels = narrow.voxels.max((resolution / stretch.max_element()).ceil() as usize);
     }
-    found.iter_mut().for_each(|gap| gap.voxels = gap.voxels_of(stretch));
-    let needed = found.iter().map(|gap| gap.voxels).filter(|&n| n <= most_voxels(stretch));
-    let voxels = if found.len() > most { base } else { needed.fold(voxels, usize::max) };
-    Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
+    let needed = kept.iter().map(|gap| gap.voxels_of(stretch)).filter(|&n| n <= most_voxels(stretch));
+    narrow.voxels = needed.fold(narrow.voxels, usize::max).min(MAX_VOXELS);
+    narrow.stretch = stretch;
+    Ok(narrow)
 }
 
 /// Computes the resolution (longest side divided by voxel thickness) that leaves open the narrow parts of the large
@@ -209,36 +236,37 @@ impl ModelGap {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// Returns a sentence with the gap's position and a remedy if the cage closes the gap; otherwise `None`. `[first,
-    /// voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was made.
-    pub(super) fn notice(
-        &self,
-        cage: &Cage,
-        [first, voxels]: [usize; 2],
-        options: &CageOptions,
-    ) -> Option<String> {
+    /// Returns the share of the gap's sheet that lies inside a cage. A cage closes the gap if it is above one half.
+    pub(super) fn closed_share(&self, cage: &Cage) -> f64 {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
-        if 2 * inside <= self.points.len() {
-            return None;
-        }
-        let wanted = self.voxels.min(MAX_VOXELS);
-        let remedy = if voxels < wanted && voxels == first {
-            format!("use {wanted} voxels instead of {voxels}")
-        } else if voxels >= wanted && self.voxels > MAX_VOXELS {
-            "move its two sides apart: no lattice is fine enough".to_owned()
-        } else if voxels < wanted || 10 * cage.n_vertices() > 9 * options.target as usize {
-            // On a finer lattice, the cage needed too many vertices.
-            format!("allow more than {} vertices", options.target)
+        inside as f64 / self.points.len() as f64
+    }
+
+    /// Returns a sentence about the gap, which the cage closes, with its position. `n_before`: number of larger gaps;
+    /// `[first, voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was
+    /// made.
+    pub(super) fn notice(
+        &self,
+        n_before: usize,
+        [first, voxels]: [usize; 2],
+        options: &CageOptions,
+    ) -> String {
+        let wanted = self.voxels_of(DVec3::ONE);
+        let least = (n_before + 1) * VERTICES_PER_GAP;
+        let remedy = if options.voxels > 0 && voxels == first && voxels < wanted && wanted <= MAX_VOXELS {
+            format!("; to keep it open, use {wanted} voxels instead of {voxels}")
+        } else if least > options.target as usize && least <= MAX_TARGET as usize {
+            format!("; to keep it open, allow at least {least} vertices")
+        } else if wanted > (STRETCHES[1] * MAX_STRETCHED_SHARE) as usize * MAX_VOXELS {
+            "; to keep it open, move its two sides apart: no lattice is fine enough".to_owned()
         } else {
-            format!("choose a smaller detail than {}", options.detail)
+            String::new()
         };
         let middle = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
         let [x, y, z] = middle.to_array().map(|x| decimals(x, 3));
         let width = decimals(self.width, 3);
-        Some(format!(
-            "the cage closes the gap of about {width} at ({x}, {y}, {z}); to keep it open, {remedy}"
-        ))
+        format!("the cage closes the gap of about {width} at ({x}, {y}, {z}){remedy}")
     }
 }
 
@@ -275,36 +303,50 @@ fn voxel(dims: [usize; 3], i: usize) -> [usize; 3] {
 pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     let dims = solid.dims;
     let wall = nearest(solid, reach);
-    let to_wall = |i: usize| {
-        let at = |i: usize| DVec3::from_array(voxel(dims, i).map(|x| x as f64));
-        at(wall[i] as usize) - at(i)
-    };
-    let is_free = |i: usize| wall[i] != NO_WALL && !closed.has(voxel(dims, i));
-    let mut width = vec![0.0; wall.len()];
+    let from_to = |v: [usize; 3], wall: Wall| [0, 1, 2].map(|k| i32::from(wall[k]) - v[k] as i32);
+    let to_wall = |i: usize| DVec3::from_array(from_to(voxel(dims, i), wall[i]).map(f64::from));
+    let dot = |a: [i32; 3], b: [i32; 3]| (0..3).map(|k| a[k] * b[k]).sum::<i32>();
+    // For each voxel of the sheet, the neighbour whose nearest wall is the facing one.
+    let mut facing = vec![u32::MAX; wall.len()];
     let mut sheet = Voxels::new(dims);
-    for i in (0..wall.len()).filter(|&i| is_free(i)) {
-        let (v, to) = (voxel(dims, i), to_wall(i));
-        let after = solid.neighbours(v).map(|next| number(dims, next)).filter(|&next| next > i);
-        for next in after.filter(|&next| is_free(next)) {
-            let across = to_wall(next);
-            if to.dot(across) < MAX_WALL_COSINE * to.length() * across.length() {
-                (width[i], width[next]) = (to.length() + across.length(), to.length() + across.length());
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    for i in (0..wall.len()).filter(|&i| wall[i] != NO_WALL) {
+        let v = voxel(dims, i);
+        let to = from_to(v, wall[i]);
+        for (axis, stride) in strides.into_iter().enumerate() {
+            if v[axis] + 1 == dims[axis] || wall[i + stride] == NO_WALL {
+                continue;
+            }
+            let mut next = v;
+            next[axis] += 1;
+            let across = from_to(next, wall[i + stride]);
+            let cosine = f64::from(dot(to, across));
+            let lengths = f64::from(dot(to, to)) * f64::from(dot(across, across));
+            if cosine < 0.0
+                && cosine < MAX_WALL_COSINE * lengths.sqrt()
+                && !closed.has(v)
+                && !closed.has(next)
+            {
+                (facing[i], facing[i + stride]) = ((i + stride) as u32, i as u32);
                 sheet.add(v);
-                sheet.add(voxel(dims, next));
+                sheet.add(next);
             }
         }
     }
+    let width = |v: [usize; 3]| {
+        let i = number(dims, v);
+        [i, facing[i] as usize].map(|i| to_wall(i).length()).iter().sum::<f64>()
+    };
     let depth = depths(&sheet, closed, &to_wall);
     let mut deep = Voxels::new(dims);
     sheet.for_each(|v| {
-        let i = number(dims, v);
-        if depth[i] as f64 >= MIN_DEPTH * width[i] {
+        if depth[number(dims, v)] as f64 >= MIN_DEPTH * width(v) {
             deep.add(v);
         }
     });
     let of_island = |voxels: Vec<[usize; 3]>| {
         let n = voxels.len() as f64;
-        let mut widths: Vec<f64> = voxels.iter().map(|&v| width[number(dims, v)]).collect();
+        let mut widths: Vec<f64> = voxels.iter().map(|&v| width(v)).collect();
         widths.sort_by(f64::total_cmp);
         let width = widths.iter().sum::<f64>() / n;
         let narrow_width = widths[(NARROW_SHARE * n) as usize];
@@ -320,24 +362,24 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
 
 /// Finds approximately the nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere.
 /// A voxel chooses among the results of its neighbours, which may not include its own nearest solid voxel.
-fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
+fn nearest(solid: &Voxels, reach: usize) -> Vec<Wall> {
     let dims = solid.dims;
-    let square = |i: u32, v: [usize; 3]| {
-        let wall = voxel(dims, i as usize);
-        (0..3).map(|k| wall[k].abs_diff(v[k]).pow(2)).sum::<usize>()
-    };
+    let square =
+        |wall: Wall, v: [usize; 3]| (0..3).map(|k| usize::from(wall[k]).abs_diff(v[k]).pow(2)).sum::<usize>();
     let mut wall = vec![NO_WALL; dims.iter().product()];
-    let mut front = Vec::new();
-    solid.for_each(|v| front.push((v, number(dims, v) as u32)));
+    let mut front: Vec<(Wall, Wall)> = Vec::new();
+    solid.border().for_each(|v| front.push((v.map(|x| x as u16), v.map(|x| x as u16))));
     while !front.is_empty() {
         let mut ahead = Vec::new();
         for (v, from) in front {
-            for next in solid.neighbours(v) {
+            for next in solid.neighbours(v.map(usize::from)) {
                 let (i, far) = (number(dims, next), square(from, next));
-                let is_farther = wall[i] != NO_WALL && square(wall[i], next) <= far;
-                if far <= reach * reach && !is_farther && !solid.has(next) {
+                if far <= reach * reach
+                    && (wall[i] == NO_WALL || square(wall[i], next) > far)
+                    && !solid.has(next)
+                {
                     wall[i] = from;
-                    ahead.push((next, from));
+                    ahead.push((next.map(|x| x as u16), from));
                 }
             }
         }

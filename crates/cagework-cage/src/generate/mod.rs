@@ -41,7 +41,7 @@ use cagework_core::disjoint::DisjointSets;
 use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use components::Components;
-use gaps::NarrowGaps;
+use gaps::{ModelGap, NarrowGaps};
 use guarded::GuardedSurface;
 pub(crate) use guarded::MIN_FOLD_COSINE;
 use lattice::{Lattice, MARGIN_VOXELS};
@@ -91,12 +91,21 @@ const LATER_RATIO: f64 = 3.7;
 /// exceed. Voxelising that many rows takes about 2 s.
 const MAX_ROWS: f64 = 1.3e8;
 
+/// Share of a gap's sheet up to which a cage may close it without a flaw.
+const MIN_CLOSED_SHARE: f64 = 0.1;
+
+/// Area of a closed gap that counts as much as a handle that the model lacks, as a fraction of the squared longest side.
+const HANDLE_AREA: f64 = 0.001;
+
+/// Limit on the voxels along the longest side of the lattice whose closed gaps are looked for.
+const GAP_VOXELS: usize = 36;
+
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
 /// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps. Collapsing that many
-/// takes about two seconds.
-const MAX_HULL: usize = 20_000;
+/// takes about three seconds.
+const MAX_HULL: usize = 26_000;
 
 /// Limit on the gaps that a report names.
 const MAX_NOTICES: usize = 3;
@@ -147,105 +156,265 @@ fn generate_plain(
     let affordable = affordable_voxels(finest.n_rows(positions, triangles, &go_on)?);
     let base = first_voxels(target).min(affordable);
     let most_gaps = target / VERTICES_PER_GAP;
-    let NarrowGaps { gaps, stretch, voxels: finest } = match (options.kind, options.smooth) {
+    let narrow = match (options.kind, options.smooth) {
         // The lattice is refined for gaps only without subdivision: a subdivided surface lies inside its cage, and the
         // finer lattice would leave less space between the cage and the model.
         (kind, 0) if kind != CageKind::Hull && affordable == MAX_VOXELS => {
+            // The lattice for gaps does not depend on the target, so that more vertices do not close a gap.
             let clearance = options.distance(bounds);
-            gaps::narrow_gaps(&soup, bounds, clearance, [base, most_gaps], &go_on)?
+            gaps::narrow_gaps(&soup, bounds, clearance, [base.min(GAP_VOXELS), most_gaps], &go_on)?
         }
-        _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
+        _ => NarrowGaps {
+            gaps: Vec::new(),
+            n_kept: 0,
+            keeps: true,
+            handles: usize::MAX,
+            stretch: DVec3::ONE,
+            voxels: base,
+        },
     };
     let mirrors = shell::find_mirrors(&soup, bounds, affordable, options, &go_on)?;
     let components = match (options.per_component, options.kind) {
         (true, kind) if kind != CageKind::Hull => {
-            let shell = |n| Shell::new(positions, triangles, bounds, (n, stretch), mirrors, options, &go_on);
+            let of = (mirrors, narrow.handles);
+            let shell =
+                |n| Shell::new(positions, triangles, bounds, (n, narrow.stretch), of, options, &go_on);
             Components::find(|n| Ok(shell(n)?.separate), [base, affordable], target)?
         }
         _ => Components::ONE,
     };
-    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest.max(components.voxels) };
-    let least = components.voxels.min(voxels);
-    let first = voxels;
-    for attempt in 1..=MAX_LATTICES {
-        let go_on = |stage: Stage, share: f32| {
-            let fraction = (attempt as f32 - 1.0 + share) / attempt as f32;
-            let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
-            if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
-        };
-        let mut shell =
-            Shell::new(positions, triangles, bounds, (voxels, stretch), mirrors, options, &|share| {
-                go_on(Stage::Voxelize, 0.4 * share)
-            })?;
-        // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
-        // lattice closes them.
-        let may_coarsen = attempt < MAX_LATTICES && voxels > least;
-        let n_half = shell.hull.positions.len();
-        if options.voxels == 0 && voxels > base && may_coarsen && n_half > MAX_HULL {
-            let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
-            voxels = (shrunk as usize).max(base).max(least);
+    let stretch = narrow.stretch;
+    let voxels = match options.voxels {
+        0 if stretch == DVec3::ONE => narrow.voxels.max(base),
+        0 => narrow.voxels,
+        asked => asked as usize,
+    };
+    // Filling passages may close a gap, so lattices whose gaps stay open are first tried without.
+    let first = Start { voxels, stretch, mirrors, fills: !narrow.keeps || narrow.gaps.is_empty() };
+    let mut starts = vec![first, Start { fills: true, ..first }];
+    if options.voxels == 0 {
+        if stretch == DVec3::ONE {
+            starts.push(Start { voxels: (voxels * 3 / 2).min(affordable), ..first });
+        }
+        let coarse = [base, GAP_VOXELS.min(affordable)];
+        starts.extend(coarse.map(|voxels| Start { voxels, stretch: DVec3::ONE, fills: true, ..first }));
+    }
+    if options.symmetry == Symmetry::Auto {
+        // With mirrors, a bridge between components has images, and each makes a handle.
+        starts.push(Start { mirrors: Mirrors::NONE, ..first });
+    }
+    starts.iter_mut().for_each(|start| start.voxels = start.voxels.max(components.voxels));
+    let model = Model { soup, bounds, base, most_gaps, least: components.voxels, narrow };
+    let mut best: Option<(Flaws, Attempt)> = None;
+    let mut attempts = 0;
+    for k in 0..starts.len() {
+        let is_in_pieces = best.as_ref().is_some_and(|(_, made)| made.shell.separate > 1);
+        if starts[..k].contains(&starts[k]) || (k > 0 && starts[k].mirrors.is_empty() && !is_in_pieces) {
             continue;
         }
-        if gaps.len() <= most_gaps {
-            shell.find_gaps(&soup, [voxels, most_gaps]);
+        let start = starts[k];
+        if best.as_ref().is_some_and(|(_, made)| made.voxels < made.first) && start.voxels > first.voxels {
+            continue;
         }
-        let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
-        let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {
-            Simplification::Cage(cage, hull) => (*cage, hull),
-            Simplification::TooMany(left) => {
-                let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
-                let lowest = if voxels > base { base.max(least) } else { least };
-                voxels = ((ratio * voxels as f64) as usize).max(lowest);
+        // Only the first lattice is replaced by coarser ones if the cage needs too many vertices.
+        let n_lattices = if start.voxels == first.voxels { MAX_LATTICES } else { 1 };
+        let made = model.attempt(start, n_lattices, options, &mut attempts, progress)?;
+        let Some(made) = made else { continue };
+        let flaws = model.flaws(&made.cage, target);
+        let is_best = best.as_ref().is_none_or(|(least, _)| flaws.is_less(least));
+        if is_best {
+            best = Some((flaws, made));
+        }
+        if best.as_ref().is_some_and(|(flaws, _)| flaws.topology == 0.0) {
+            break;
+        }
+    }
+    let Some((_, Attempt { cage, shell, hull, voxels, .. })) = best else {
+        return Err(CageGenError::Unresolved);
+    };
+    let (parts, first) = (n_parts(&cage), first.voxels.max(model.least));
+    let coarser = (options.voxels > 0 && voxels < first).then(|| {
+        format!(
+            "the lattice has {voxels} voxels instead of {first}, with which the cage needs more than {} vertices",
+            options.target
+        )
+    });
+    let closed = model.narrow.gaps.iter().enumerate().filter(|(_, gap)| gap.closed_share(&cage) > 0.5);
+    let closed = closed.map(|(k, gap)| gap.notice(k, [first, voxels], options));
+    let report = CageReport {
+        kind: if options.kind == CageKind::Hull { CageKind::Hull } else { CageKind::Shell },
+        refusal: None,
+        target: options.target,
+        vertices: cage.n_vertices() as u32,
+        faces: cage.faces().len() as u32,
+        quads: cage.faces().iter().filter(|face| face.len() == 4).count() as u32,
+        target_met: cage.n_vertices() as f64 <= MAX_TARGET_RATIO * target as f64,
+        voxels: voxels as u32,
+        voxel_size: shell.lattice.cell as f32,
+        clearance: shell.clearance as f32,
+        mirror: shell.hull.mirrors.axes().next().map(Mirror::of_axis),
+        notices: components
+            .notice(parts, options)
+            .into_iter()
+            .chain(coarser)
+            .chain(closed.take(MAX_NOTICES))
+            .collect(),
+        parts,
+        separate: shell.separate as u32,
+        hull_vertices: shell.hull.n_whole() as u32,
+        hull,
+        attempts,
+        elapsed_ms: progress.now_ms() - began,
+    };
+    Ok(GeneratedCage { cage, report, rings: None })
+}
+
+/// A lattice to try, and how its hull is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Start {
+    /// Voxels along the model's longest side.
+    voxels: usize,
+    /// Longest edge of a voxel divided by its edge along each axis.
+    stretch: DVec3,
+    mirrors: Mirrors,
+    /// Whether passages are filled that make handles which the model lacks.
+    fills: bool,
+}
+
+/// A model and what its cages have in common.
+struct Model<'a> {
+    soup: Soup<'a>,
+    bounds: [DVec3; 2],
+    /// Voxels along the longest side without gaps, and the smallest number that keeps components apart.
+    base: usize,
+    least: usize,
+    /// Limit on the gaps that a cage keeps open.
+    most_gaps: usize,
+    narrow: NarrowGaps,
+}
+
+/// A verified cage, and how it was made.
+struct Attempt {
+    cage: Cage,
+    shell: Shell,
+    /// Whether the cage is the hull without simplification.
+    hull: bool,
+    /// Voxels along the longest side of the first lattice, and of the lattice on which the cage was made.
+    first: usize,
+    voxels: usize,
+}
+
+/// What a cage lacks.
+#[derive(Debug)]
+struct Flaws {
+    /// Sum of the areas of the gaps that the cage closes, in [`HANDLE_AREA`], plus the number of handles that the model
+    /// lacks.
+    topology: f64,
+    /// Volume of the cage, which measures its distance from the model, times its number of vertices.
+    size: f64,
+}
+
+impl Flaws {
+    fn is_less(&self, other: &Self) -> bool {
+        [self.topology, self.size] < [other.topology, other.size]
+    }
+}
+
+impl Model<'_> {
+    fn flaws(&self, cage: &Cage, target: usize) -> Flaws {
+        let closed = |gap: &ModelGap| {
+            let share = gap.closed_share(cage);
+            if share > MIN_CLOSED_SHARE { share * gap.area } else { 0.0 }
+        };
+        let closed = self.narrow.gaps[..self.narrow.n_kept].iter().map(closed).sum::<f64>();
+        let n_handles =
+            i64::from(n_parts(cage)) - (cage.n_vertices() as i64 - cage.triangles().len() as i64 / 2) / 2;
+        let handles = (n_handles.max(0) as usize).saturating_sub(self.narrow.handles);
+        let corners = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+        let volume = corners.map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0;
+        let topology = closed / HANDLE_AREA + handles as f64;
+        Flaws { topology, size: volume * cage.n_vertices().max(target / 2) as f64 }
+    }
+
+    /// Makes a cage on a lattice of `first` voxels along the model's longest side, or on a coarser one if the cage needs
+    /// too many vertices. `None` if no cage passes verification.
+    fn attempt(
+        &self,
+        Start { voxels: first, stretch, mirrors, fills }: Start,
+        n_lattices: usize,
+        options: &CageOptions,
+        attempts: &mut u32,
+        progress: &dyn Progress,
+    ) -> Result<Option<Attempt>, CageGenError> {
+        let (base, least, target) = (self.base, self.least.min(first), options.target as usize);
+        let (mut voxels, mut mirrors) = (first, mirrors);
+        for attempt in 1..=n_lattices {
+            *attempts += 1;
+            let done = *attempts;
+            let go_on = |stage: Stage, share: f32| {
+                let fraction = (done as f32 - 1.0 + share) / done as f32;
+                let event = ProgressEvent { stage, fraction, iteration: done - 1, delta: None };
+                if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
+            };
+            let Soup { positions, triangles, .. } = self.soup;
+            let shell_of = |mirrors: Mirrors| -> Result<Shell, Cancellation> {
+                let of = (mirrors, if fills { self.narrow.handles } else { usize::MAX });
+                let voxelize = |share| go_on(Stage::Voxelize, 0.4 * share);
+                let lattice = (voxels, stretch);
+                let mut shell =
+                    Shell::new(positions, triangles, self.bounds, lattice, of, options, &voxelize)?;
+                if self.narrow.keeps {
+                    shell.find_gaps(&self.soup, [voxels, self.most_gaps]);
+                }
+                Ok(shell)
+            };
+            let shell = shell_of(mirrors)?;
+            // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
+            // lattice closes them.
+            let may_coarsen = attempt < MAX_LATTICES && voxels > least;
+            let may_shrink = attempt < n_lattices && may_coarsen;
+            let n_half = shell.hull.positions.len();
+            if options.voxels == 0 && voxels > base && may_shrink && n_half > MAX_HULL {
+                let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
+                voxels = (shrunk as usize).max(base).max(least);
                 continue;
             }
-        };
-        if mirrors.len() > 1 {
-            // Corners at the crossings of several mirror planes may cost vertices.
-            let first = mirrors.first();
-            let of_one =
-                Shell::new(positions, triangles, bounds, (voxels, stretch), first, options, &|_| {
-                    simplify(0.0)
-                })?;
-            if let Simplification::Cage(other, false) =
-                simplify_hull(&of_one, options, may_coarsen, &simplify)?
-                && other.n_vertices() as f64 * MIN_SAVING < cage.n_vertices() as f64
-            {
-                (cage, shell) = (*other, of_one);
+            let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
+            let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify) {
+                Ok(Simplification::Cage(cage, hull)) => (*cage, hull),
+                Ok(Simplification::TooMany(_)) if mirrors.len() > 1 => {
+                    mirrors = mirrors.first();
+                    continue;
+                }
+                Ok(Simplification::TooMany(left)) => {
+                    let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
+                    let lowest = if voxels > base { base.max(least) } else { least };
+                    voxels = ((ratio * voxels as f64) as usize).max(lowest);
+                    continue;
+                }
+                Err(CageGenError::Unresolved) => return Ok(None),
+                Err(error) => return Err(error),
+            };
+            let mut shell = shell;
+            if mirrors.len() > 1 && cage.n_vertices() > MIN_TARGET as usize {
+                // Crossings of several mirror planes may cost vertices, and these may be missing for gaps.
+                let of_one = shell_of(mirrors.first())?;
+                let other = simplify_hull(&of_one, options, may_coarsen, &simplify);
+                if let Err(CageGenError::Cancelled(cancelled)) = other {
+                    return Err(cancelled.into());
+                }
+                if let Ok(Simplification::Cage(other, false)) = other {
+                    let [all, one] = [&cage, &*other].map(|cage| self.flaws(cage, target).topology);
+                    let saves = other.n_vertices() as f64 * MIN_SAVING < cage.n_vertices() as f64;
+                    if one < all || (one == all && saves) {
+                        (cage, shell) = (*other, of_one);
+                    }
+                }
             }
+            return Ok(Some(Attempt { cage, shell, hull, first, voxels }));
         }
-        let parts = n_parts(&cage);
-        let coarser = (options.voxels > 0 && voxels < first).then(|| {
-            format!(
-                "the lattice has {voxels} voxels instead of {first}, with which the cage needs more than {} vertices",
-                options.target
-            )
-        });
-        let closed = gaps.iter().filter_map(|gap| gap.notice(&cage, [first, voxels], options));
-        let notices =
-            components.notice(parts, options).into_iter().chain(coarser).chain(closed.take(MAX_NOTICES));
-        let report = CageReport {
-            kind: if options.kind == CageKind::Hull { CageKind::Hull } else { CageKind::Shell },
-            refusal: None,
-            target: options.target,
-            vertices: cage.n_vertices() as u32,
-            faces: cage.faces().len() as u32,
-            quads: cage.faces().iter().filter(|face| face.len() == 4).count() as u32,
-            target_met: cage.n_vertices() as f64 <= MAX_TARGET_RATIO * target as f64,
-            voxels: voxels as u32,
-            voxel_size: shell.lattice.cell as f32,
-            clearance: shell.clearance as f32,
-            mirror: shell.hull.mirrors.axes().next().map(Mirror::of_axis),
-            notices: notices.collect(),
-            parts,
-            separate: shell.separate as u32,
-            hull_vertices: shell.hull.n_whole() as u32,
-            hull,
-            attempts: attempt as u32,
-            elapsed_ms: progress.now_ms() - began,
-        };
-        return Ok(GeneratedCage { cage, report, rings: None });
+        Ok(None)
     }
-    Err(CageGenError::Unresolved)
 }
 
 /// Returns the initial number of voxels along the longest side. It grows with the target, as a cage of few vertices

@@ -21,6 +21,9 @@ use cagework_core::progress::Cancellation;
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
 const MIN_MIRROR_SHARE: f64 = 0.985;
 
+/// Smallest share of voxels whose mirror image is a voxel, too, for the second and third mirror plane.
+const MIN_EXACT_SHARE: f64 = 0.995;
+
 /// Distance up to which a voxel counts as the mirror image of another one, as a fraction of the model's longest side;
 /// at least one voxel.
 const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
@@ -88,6 +91,19 @@ const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(-1.0, 1.0, 1.0),
 ];
 
+/// Largest share of the sheet of a gap that the image of a symmetric model covers. A model with a larger share has a part
+/// on one side only that closes the gap.
+const MAX_CLOSED_SHARE: f64 = 0.1;
+
+/// Half the width, in voxels, of the widest passages of a hull that are filled.
+const MAX_CLOSING: usize = 4;
+
+/// A hull with more handles, such as that of scattered cards, keeps them.
+const MAX_HANDLES: isize = 100;
+
+/// Limit on the passages of each width that are tried, largest first.
+const MAX_PASSAGES: usize = 24;
+
 /// Limit on the distance between neighbouring cage vertices on a limb or plate. With wider spacing, the cage has too
 /// few vertices to bend the limb or plate.
 #[derive(Clone, Copy, Debug)]
@@ -133,13 +149,13 @@ pub(super) struct Shell {
 
 impl Shell {
     /// Builds the hull of a model on a lattice of `n` voxels along the model's longest side, with the given stretch.
-    /// `go_on` may cancel.
+    /// Passages of the hull are filled if it has more than `handles` handles. `go_on` may cancel.
     pub(super) fn new(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
         bounds: [DVec3; 2],
         (n, stretch): (usize, DVec3),
-        mirrors: Mirrors,
+        (mirrors, handles): (Mirrors, usize),
         options: &CageOptions,
         go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
     ) -> Result<Self, Cancellation> {
@@ -168,6 +184,7 @@ impl Shell {
                 hull = dilate_hull(&solid, layers, mirrors);
             }
         }
+        close_handles(&mut hull, handles, mirrors);
         go_on(0.8)?;
         let stairs = Surface::of(&hull, mirrors);
         let filled = hull;
@@ -278,14 +295,41 @@ fn dilate_hull(solid: &Voxels, layers: usize, mirrors: Mirrors) -> Voxels {
         hull = hull.dilated();
     }
     hull = hull.filled();
+    compose_hull(&mut hull, mirrors);
+    hull
+}
+
+/// Makes the boundary of a hull a 2-manifold, and fills the cavities that the added voxels enclose.
+fn compose_hull(hull: &mut Voxels, mirrors: Mirrors) {
     loop {
         hull.compose(mirrors);
-        // The added voxels may enclose a cavity: fill it, and repeat.
         let filled = hull.filled();
-        if filled == hull {
-            return hull;
+        if filled == *hull {
+            return;
         }
-        hull = filled;
+        *hull = filled;
+    }
+}
+
+/// Fills narrow passages of a hull, narrowest first, each only if that leaves fewer handles, until at most `most` handles
+/// are left. A lattice that is too coarse for a gap closes it in some places only, and each opening is a handle.
+fn close_handles(hull: &mut Voxels, most: usize, mirrors: Mirrors) {
+    for layers in 1..=MAX_CLOSING {
+        let n_handles = hull.parts().len() as isize - hull.euler();
+        if n_handles <= most as isize || n_handles > MAX_HANDLES {
+            return;
+        }
+        let mut islands = hull.closed(layers).without(hull).islands();
+        islands.sort_by_key(|island| std::cmp::Reverse(island.len()));
+        for island in islands.into_iter().take(MAX_PASSAGES) {
+            let mut wider = hull.clone();
+            island.iter().for_each(|&v| wider.add(v));
+            mirrors.complete(&mut wider);
+            if wider.euler() > hull.euler() {
+                *hull = wider;
+            }
+        }
+        compose_hull(hull, mirrors);
     }
 }
 
@@ -309,8 +353,8 @@ fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
 }
 
 /// Finds the mirror planes: the requested one, or the first of x, z, y in which the model is symmetric up to
-/// [`MIRROR_TOLERANCE`], and the others in which it is symmetric up to one voxel. In both cases, small scattered parts may
-/// differ, unless the image of such a part would close a gap. `finest`: limit on the number of voxels along the model's
+/// [`MIRROR_TOLERANCE`], and the others in which it is symmetric voxel by voxel. In both cases, small scattered parts may
+/// differ, unless the image of a part would close a gap. `finest`: limit on the number of voxels along the model's
 /// longest side.
 ///
 /// # Errors
@@ -336,9 +380,10 @@ pub(super) fn find_mirrors(
         _ => lattice.voxelize(soup.positions, soup.triangles, go_on)?,
     };
     let solid = touched.filled();
-    let mut sheets = None;
-    let mut is_symmetric = |axis: usize, tolerance: usize| {
-        let image = (0..tolerance).fold(solid.mirrored(axis), |image, _| image.dilated());
+    let mut sheets: Option<Vec<Gap>> = None;
+    let mut is_symmetric = |axis: usize, tolerance: usize, share: f64| {
+        let whole_image = solid.mirrored(axis);
+        let image = (0..tolerance).fold(whole_image.clone(), |image, _| image.dilated());
         let unmatched = solid.without(&image);
         let extent = |island: &Vec<[usize; 3]>| {
             let side = |k: usize| {
@@ -348,24 +393,26 @@ pub(super) fn find_mirrors(
             (0..3).map(side).max().unwrap_or(0)
         };
         let is_small = |island: &Vec<[usize; 3]>| (extent(island) as f64) < MAX_UNMATCHED_SHARE * n as f64;
-        unmatched.count() as f64 <= (1.0 - MIN_MIRROR_SHARE) * solid.count() as f64
+        unmatched.count() as f64 <= (1.0 - share) * solid.count() as f64
             && unmatched.islands().iter().all(is_small)
-            && !unmatched.mirrored(axis).meets(sheets.get_or_insert_with(|| large_sheets(&solid, n)))
+            && sheets.get_or_insert_with(|| large_gaps(&solid, n)).iter().all(|gap| {
+                let closed = gap.voxels.iter().filter(|v| whole_image.has(**v)).count();
+                closed as f64 <= MAX_CLOSED_SHARE * gap.voxels.len() as f64
+            })
     };
     let tolerance = (MIRROR_TOLERANCE * n as f64).round().max(1.0) as usize;
     Ok(Mirrors::ALL.axes().fold(Mirrors::NONE, |mirrors, axis| {
-        let tolerance = if mirrors.is_empty() { tolerance } else { 1 };
-        if is_symmetric(axis, tolerance) { mirrors.or(Mirrors::of_axis(axis)) } else { mirrors }
+        let (tolerance, share) =
+            if mirrors.is_empty() { (tolerance, MIN_MIRROR_SHARE) } else { (0, MIN_EXACT_SHARE) };
+        if is_symmetric(axis, tolerance, share) { mirrors.or(Mirrors::of_axis(axis)) } else { mirrors }
     }))
 }
 
-/// Returns the sheets of the large gaps of a solid. `n`: number of voxels along the model's longest side.
-fn large_sheets(solid: &Voxels, n: usize) -> Voxels {
-    let mut sheets = Voxels::new(solid.dims);
-    let found = gaps(solid, solid, (MAX_GAP_HALF * n as f64).ceil() as usize);
-    let large = found.iter().filter(|gap| gap.area >= MIN_GAP_AREA * (n * n) as f64);
-    large.flat_map(|gap| &gap.voxels).for_each(|&v| sheets.add(v));
-    sheets
+/// Finds the large gaps of a solid. `n`: number of voxels along the model's longest side.
+fn large_gaps(solid: &Voxels, n: usize) -> Vec<Gap> {
+    let mut found = gaps(solid, solid, (MAX_GAP_HALF * n as f64).ceil() as usize);
+    found.retain(|gap| gap.area >= MIN_GAP_AREA * (n * n) as f64);
+    found
 }
 
 /// Adds to the solid paths of voxels that join the components of the hull, shortest first (breadth-first search from

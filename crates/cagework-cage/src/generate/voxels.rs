@@ -83,11 +83,6 @@ impl Voxels {
         Self { bits: self.bits.iter().zip(&other.bits).map(|(a, b)| a & !b).collect(), ..*self }
     }
 
-    /// Whether the two sets, in the same box, have a voxel in common.
-    pub(super) fn meets(&self, other: &Self) -> bool {
-        self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0)
-    }
-
     /// Returns the mirror image about the middle of `axis`.
     pub(super) fn mirrored(&self, axis: usize) -> Self {
         let mut mirrored = Self::new(self.dims);
@@ -119,19 +114,70 @@ impl Voxels {
         wide
     }
 
-    /// Returns the set with its cavities filled: the complement of the outside voxels that are face-connected to the
-    /// box's corner.
-    pub(super) fn filled(&self) -> Self {
+    /// Returns the voxels of the set that have a neighbour outside it (of 26).
+    pub(super) fn border(&self) -> Self {
+        self.without(&self.inverted().dilated().inverted())
+    }
+
+    /// Returns the set with its narrow passages filled: dilated by `layers` voxels, then eroded by as many. That many
+    /// outermost layers of the box must be empty.
+    pub(super) fn closed(&self, layers: usize) -> Self {
+        let dilated = |voxels: Self| (0..layers).fold(voxels, |voxels, _| voxels.dilated());
+        dilated(dilated(self.clone()).inverted()).inverted()
+    }
+
+    /// Euler characteristic of the union of the voxels as closed cubes: vertices - edges + faces - cubes. For a
+    /// well-composed set without cavities, it is the number of components minus the number of handles.
+    pub(super) fn euler(&self) -> isize {
+        // The cubes around the elements of a kind are one cube, shifted along the axes in which the element is thin.
+        let spread = |thin: usize| {
+            (0..3).filter(|axis| thin >> axis & 1 == 1).fold(self.clone(), |set, axis| set.spread(axis))
+        };
+        let signed = |thin: usize| {
+            let n = spread(thin).count() as isize;
+            if thin.count_ones() % 2 == 1 { n } else { -n }
+        };
+        (0..8).map(signed).sum()
+    }
+
+    /// Adds to each voxel the next one along an axis. The outermost layer of the box must be empty.
+    fn spread(&self, axis: usize) -> Self {
+        let mut wide = self.clone();
+        let stride = [0, self.words, self.words * self.dims[1]][axis];
+        for (k, bits) in wide.bits.iter_mut().enumerate() {
+            *bits |= match axis {
+                0 if k % self.words == 0 => self.bits[k] << 1,
+                0 => self.bits[k] << 1 | self.bits[k - 1] >> (WORD - 1),
+                _ => {
+                    if k >= stride {
+                        self.bits[k - stride]
+                    } else {
+                        0
+                    }
+                }
+            };
+        }
+        wide
+    }
+
+    /// Returns the voxels of the box that are not in the set.
+    fn inverted(&self) -> Self {
         let mut all = Self::new(self.dims);
         for z in 0..self.dims[2] {
             for y in 0..self.dims[1] {
                 all.add_run(y, z, 0, self.dims[0] - 1);
             }
         }
+        all.without(self)
+    }
+
+    /// Returns the set with its cavities filled: the complement of the outside voxels that are face-connected to the
+    /// box's corner.
+    pub(super) fn filled(&self) -> Self {
         let mut reached = Self::new(self.dims);
         let mut waiting = vec![false; self.dims[1] * self.dims[2]];
-        all.without(self).reach([0, 0, 0], &mut reached, &mut waiting);
-        all.without(&reached)
+        self.inverted().reach([0, 0, 0], &mut reached, &mut waiting);
+        reached.inverted()
     }
 
     /// Flood fill: adds to `reached` the voxel `from` and the voxels of this set that are face-connected to it, row by
@@ -321,4 +367,23 @@ fn is_critical(block: usize) -> bool {
         block == pair || block == 255 ^ pair
     });
     edge || corner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ring of voxels around a square passage has one component and one handle; without the passage, it is a box.
+    #[test]
+    fn filling_the_passage_of_a_ring_removes_its_handle() {
+        let mut ring = Voxels::new([70, 12, 12]);
+        for (x, y) in (60..66).flat_map(|x| (3..9).map(move |y| (x, y))) {
+            if !((62..64).contains(&x) && (5..7).contains(&y)) {
+                ring.add([x, y, 5]);
+            }
+        }
+        assert_eq!((ring.count(), ring.euler(), ring.border().count()), (32, 0, 32));
+        let filled = ring.closed(1);
+        assert_eq!((filled.count(), filled.euler()), (36, 1));
+    }
 }
