@@ -2,8 +2,6 @@
 
 use glam::DVec3;
 
-use super::voxels::Voxels;
-
 /// A set of the planes x = 0, y = 0 and z = 0 (centred coordinates), one bit per axis. A surface has the planes in which
 /// it is symmetric; a vertex, those on which it lies; an image of a vertex, those in which it is mirrored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,10 +70,5 @@ impl Mirrors {
     pub(super) fn reflect(self, mut p: DVec3) -> DVec3 {
         self.axes().for_each(|axis| p[axis] = -p[axis]);
         p
-    }
-
-    /// Adds to a voxel set its images, so that it becomes symmetric in all planes of the set.
-    pub(super) fn complete(self, voxels: &mut Voxels) {
-        self.axes().for_each(|axis| voxels.unite(&voxels.mirrored(axis)));
     }
 }

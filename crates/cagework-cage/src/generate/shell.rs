@@ -172,7 +172,7 @@ impl Shell {
         };
         let mut solid = touched.filled();
         if !mirrors.is_empty() {
-            mirrors.complete(&mut solid);
+            solid.mirror(mirrors);
             solid = solid.filled();
         }
         go_on(0.6)?;
@@ -324,7 +324,7 @@ fn close_handles(hull: &mut Voxels, most: usize, mirrors: Mirrors) {
         for island in islands.into_iter().take(MAX_PASSAGES) {
             let mut wider = hull.clone();
             island.iter().for_each(|&v| wider.add(v));
-            mirrors.complete(&mut wider);
+            wider.mirror(mirrors);
             if wider.euler() > hull.euler() {
                 *hull = wider;
             }
@@ -458,7 +458,7 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirrors: Mirrors) ->
             left -= 1;
         }
     }
-    mirrors.complete(solid);
+    solid.mirror(mirrors);
     true
 }
 

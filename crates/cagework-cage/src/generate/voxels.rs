@@ -237,6 +237,11 @@ impl Voxels {
         }
     }
 
+    /// Adds the images of the voxels, so that the set is symmetric in all planes.
+    pub(super) fn mirror(&mut self, mirrors: Mirrors) {
+        mirrors.axes().for_each(|axis| self.unite(&self.mirrored(axis)));
+    }
+
     /// Adds voxels until the set's boundary is a 2-manifold. Where two voxels share only an edge or a corner, their
     /// bounding box is filled. Terminates because voxels are only added, within the set's bounding box.
     ///
@@ -254,7 +259,7 @@ impl Voxels {
                 return;
             }
             // Which voxels are added depends on the order of blocks, so add their mirror images, too.
-            mirrors.complete(self);
+            self.mirror(mirrors);
         }
     }
 
