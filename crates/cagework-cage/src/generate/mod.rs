@@ -64,7 +64,7 @@ const MAX_TARGET_RATIO: f64 = 1.1;
 
 /// A cage that is symmetric in one plane only is preferred if the cage with all planes of the model has more than this
 /// multiple of its vertices.
-const MIN_SAVING: f64 = 1.4;
+const MIN_SAVING: f64 = 1.6;
 
 /// Layers of voxels around the hull to which the cage is confined, tried in this order until the target is met. Narrow
 /// bands keep the cage from spanning gaps; `None` does not confine it.
@@ -93,6 +93,9 @@ const MAX_ROWS: f64 = 1.3e8;
 
 /// Share of a gap's sheet up to which a cage may close it without a flaw.
 const MIN_CLOSED_SHARE: f64 = 0.1;
+
+/// Share of a gap's sheet inside a cage above which the cage closes the gap.
+const MAX_OPEN_SHARE: f64 = 0.5;
 
 /// Area of a closed gap that counts as much as a handle that the model lacks, as a fraction of the squared longest side.
 const HANDLE_AREA: f64 = 0.001;
@@ -216,6 +219,11 @@ fn generate_plain(
         if best.as_ref().is_some_and(|(_, made)| made.voxels < made.first) && start.voxels > first.voxels {
             continue;
         }
+        // Without superfluous handles, there are no passages to fill.
+        let fills_only = start == Start { fills: true, ..starts[0] };
+        if k > 0 && fills_only && best.as_ref().is_some_and(|(flaws, _)| flaws.handles == 0) {
+            continue;
+        }
         // Only the first lattice is replaced by coarser ones if the cage needs too many vertices.
         let n_lattices = if start.voxels == first.voxels { MAX_LATTICES } else { 1 };
         let made = model.attempt(start, n_lattices, options, &mut attempts, progress)?;
@@ -239,7 +247,8 @@ fn generate_plain(
             options.target
         )
     });
-    let closed = model.narrow.gaps.iter().enumerate().filter(|(_, gap)| gap.closed_share(&cage) > 0.5);
+    let closed =
+        model.narrow.gaps.iter().enumerate().filter(|(_, gap)| gap.closed_share(&cage) > MAX_OPEN_SHARE);
     let closed = closed.map(|(k, gap)| gap.notice(k, [first, voxels], options));
     let report = CageReport {
         kind: if options.kind == CageKind::Hull { CageKind::Hull } else { CageKind::Shell },
@@ -310,6 +319,8 @@ struct Flaws {
     /// Sum of the areas of the gaps that the cage closes, in [`HANDLE_AREA`], plus the number of handles that the model
     /// lacks.
     topology: f64,
+    /// Number of handles that the model lacks.
+    handles: usize,
     /// Volume of the cage, which measures its distance from the model, times its number of vertices.
     size: f64,
 }
@@ -324,7 +335,11 @@ impl Model<'_> {
     fn flaws(&self, cage: &Cage, target: usize) -> Flaws {
         let closed = |gap: &ModelGap| {
             let share = gap.closed_share(cage);
-            if share > MIN_CLOSED_SHARE { share * gap.area } else { 0.0 }
+            match share {
+                MAX_OPEN_SHARE.. => gap.area,
+                MIN_CLOSED_SHARE.. => share * gap.area,
+                _ => 0.0,
+            }
         };
         let closed = self.narrow.gaps[..self.narrow.n_kept].iter().map(closed).sum::<f64>();
         let n_handles =
@@ -333,7 +348,7 @@ impl Model<'_> {
         let corners = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let volume = corners.map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0;
         let topology = closed / HANDLE_AREA + handles as f64;
-        Flaws { topology, size: volume * cage.n_vertices().max(target / 2) as f64 }
+        Flaws { topology, handles, size: volume * cage.n_vertices().max(target / 2) as f64 }
     }
 
     /// Makes a cage on a lattice of `first` voxels along the model's longest side, or on a coarser one if the cage needs

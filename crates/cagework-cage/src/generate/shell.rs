@@ -99,7 +99,7 @@ const MAX_CLOSED_SHARE: f64 = 0.1;
 const MAX_CLOSING: usize = 4;
 
 /// A hull with more handles, such as that of scattered cards, keeps them.
-const MAX_HANDLES: isize = 100;
+const MAX_HANDLES: usize = 100;
 
 /// Limit on the passages of each width that are tried, largest first.
 const MAX_PASSAGES: usize = 24;
@@ -315,8 +315,8 @@ fn compose_hull(hull: &mut Voxels, mirrors: Mirrors) {
 /// are left. A lattice that is too coarse for a gap closes it in some places only, and each opening is a handle.
 fn close_handles(hull: &mut Voxels, most: usize, mirrors: Mirrors) {
     for layers in 1..=MAX_CLOSING {
-        let n_handles = hull.parts().len() as isize - hull.euler();
-        if n_handles <= most as isize || n_handles > MAX_HANDLES {
+        let n_handles = (hull.parts().len() as isize - hull.euler()).max(0) as usize;
+        if n_handles <= most || n_handles > MAX_HANDLES {
             return;
         }
         let mut islands = hull.closed(layers).without(hull).islands();
