@@ -127,7 +127,7 @@ fn one_cage_encloses_models_and_folders_of_models() {
     sandbox.write("clothes/.hidden.obj", "damaged");
     sandbox.write("clothes/notes.txt", "sizes");
     let together = "cage mesh.obj clothes -o clothes/cage.obj";
-    let made = sandbox.json(&format!("{together} --vertices 60 --json"));
+    let made = sandbox.json(&format!("{together} --kind shell --vertices 60 --json"));
     assert_eq!((&made["models"], &made["kind"]), (&3.into(), &"shell".into()));
     for model in ["mesh.obj", "clothes/b.obj", "clothes/c.obj"] {
         let check = sandbox.json(&format!("check clothes/cage.obj --mesh {model} --json"));
