@@ -38,7 +38,7 @@ use base::Place;
 use fit::Fit;
 use guard::{Fault, verify};
 use limb::Limb;
-use samples::{Sample, samples, thinned};
+use samples::{MAX_SAMPLES, Sample, n_samples, samples, thinned};
 
 /// Smallest distance of rings from the model, as a share of the model's diagonal.
 const CLEARANCE: f64 = 0.006;
@@ -103,6 +103,14 @@ pub enum Refusal {
         target: usize,
         /// Smallest number of vertices.
         needed: usize,
+    },
+    /// The faces are so large together that checking them takes too long.
+    #[error(
+        "the model's faces overlap too much for sleeves: they take {samples} samples, and at most {MAX_SAMPLES} are allowed; use the kind shell"
+    )]
+    TooManySamples {
+        /// Number of samples of the model's surface.
+        samples: usize,
     },
     /// Limbs touch or overlap.
     #[error(
@@ -238,6 +246,10 @@ pub fn generate(
     let units = Units::new(positions, skeleton);
     let at = positions.iter().map(|p| units.inner(p.as_dvec3())).collect();
     let model = Model { at, triangles: triangles.to_vec() };
+    let n = n_samples(&model);
+    if n > MAX_SAMPLES {
+        return Err(Refusal::TooManySamples { samples: n }.into());
+    }
     let unmirrored = samples(&model, &skeleton.chain_of, &skeleton.bone_of);
     let points: Vec<Vec3> = positions
         .iter()

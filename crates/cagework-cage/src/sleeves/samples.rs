@@ -10,6 +10,10 @@ const SPACING: f64 = 0.02;
 /// Largest number of parts into which the edges of a triangle are divided for sampling.
 const MAX_PARTS: usize = 40;
 
+/// Limit on the samples of a model. Figures have up to some hundred thousand; triangles as large as the model that
+/// overlap each other have many more, and take memory and time in proportion.
+pub(super) const MAX_SAMPLES: usize = 1_000_000;
+
 /// Edge of the cells in which only extreme points are kept.
 const CELL: f64 = 0.025;
 
@@ -33,14 +37,28 @@ pub(super) struct Sample {
     pub(super) bone: u32,
 }
 
+/// Number of parts into which the edges of a triangle are divided.
+fn parts_of(corners: [DVec3; 3]) -> usize {
+    let longest = (0..3).map(|k| corners[k].distance(corners[(k + 1) % 3])).fold(0.0, f64::max);
+    ((longest / SPACING).ceil() as usize).min(MAX_PARTS)
+}
+
+/// Number of samples of a model, at most three per triangle more than [`samples`] returns.
+pub(super) fn n_samples(model: &Model) -> usize {
+    let of = |triangle: &[u32; 3]| match parts_of(triangle.map(|v| model.at[v as usize])) {
+        0 | 1 => 0,
+        n => (n + 1) * (n + 2) / 2,
+    };
+    model.at.len() + model.triangles.iter().map(of).sum::<usize>()
+}
+
 /// Samples vertices and triangles. `limb_of`: limb of each vertex. `[n_vertices]`
 pub(super) fn samples(model: &Model, limb_of: &[u32], bone_of: &[u32]) -> Vec<Sample> {
     let of = |at: DVec3, vertex: usize| Sample { at, limb: limb_of[vertex], bone: bone_of[vertex] };
     let mut samples: Vec<Sample> = model.at.iter().enumerate().map(|(v, &p)| of(p, v)).collect();
     for triangle in &model.triangles {
         let corners = triangle.map(|v| model.at[v as usize]);
-        let longest = (0..3).map(|k| corners[k].distance(corners[(k + 1) % 3])).fold(0.0, f64::max);
-        let n = ((longest / (SPACING)).ceil() as usize).min(MAX_PARTS);
+        let n = parts_of(corners);
         for (i, j) in (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j))) {
             let parts = [i, j, n - i - j];
             let most = (0..3).max_by_key(|&k| (parts[k], 2 - k)).unwrap_or(0);
