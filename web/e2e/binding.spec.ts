@@ -46,12 +46,12 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
   });
 
   await test.step("a cancelled bind keeps the previous one and marks the new settings", async () => {
-    await grid("256").check({ force: true });
+    await grid("128").check({ force: true });
     await page.keyboard.press("Control+Enter");
     await expect(page.locator(".plot polyline"), "the chart shows this bind only").toHaveCount(1);
     await page.getByRole("button", { name: "Cancel" }).click();
     await hears(page, "Cancelled. The previous bind is still active.");
-    await expect(grid("256")).toBeChecked();
+    await expect(grid("128")).toBeChecked();
     await expect(page.getByText("Not applied yet: bind again to use these settings.")).toBeVisible();
     await bound(page);
   });
