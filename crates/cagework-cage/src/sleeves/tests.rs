@@ -210,10 +210,12 @@ fn refusals_say_what_to_do() {
     wrong.skeleton.chains[0].at.truncate(2);
     let sentence = "the skeleton has a trunk of 2 joints: sleeves need at least three";
     assert_eq!(refusal(&wrong, 80).to_string(), sentence);
-    // 2000 copies of a triangle as large as the figure, of 861 samples each.
+    // 10,000 copies of a triangle as high as the figure, of more than 100 samples each.
     let mut soup = figure(0.16);
-    let last = soup.positions.len() as u32 - 1;
-    soup.triangles = vec![[0, last / 2, last]; 2000];
+    let order = |a: &u32, b: &u32| soup.positions[*a as usize].y.total_cmp(&soup.positions[*b as usize].y);
+    let all = 0..soup.positions.len() as u32;
+    let [low, high] = [all.clone().min_by(order).unwrap(), all.max_by(order).unwrap()];
+    soup.triangles = vec![[low, high, low + 1]; 10_000];
     let Refusal::TooManySamples { samples } = refusal(&soup, 80) else { panic!("they are too many") };
     assert!(samples > MAX_SAMPLES);
 }
