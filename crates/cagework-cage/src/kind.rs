@@ -37,6 +37,7 @@ const SLEEVE_SHARE: f32 = 0.7;
 /// otherwise [`CageReport::refusal`] says why it does not. The score is a mean distance: that of the cage's surface from
 /// the model, in diagonals of the model's box, plus 0.1 times the share of its area whose corners are nearest to two
 /// different limbs, plus 0.01 without rings, or 0.1 times the share of the limbs that share the rings of their parent.
+/// Models without a rig keep a shell that has at most three quarters of the vertices of the sleeves.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
 /// `[n_triangles]`, any soup. `rig`: joints at the rest of `positions`. Without a rig, or if its joints have no limbs,
@@ -80,7 +81,14 @@ pub fn generate_with_skeleton(
         (CageKind::Auto, Ok((made, skeleton))) => {
             let shell = shell(&model, options, progress)?;
             let [own, other] = [&made, &shell].map(|made| score(made, &model, &skeleton));
-            if own <= other {
+            let [n_sleeves, n_shell] = [made.report.vertices, shell.report.vertices];
+            // Corners of a simple shape, such as a cylinder, look like limbs in its voxels.
+            if rig.is_none() && 4 * n_shell <= 3 * n_sleeves {
+                let refusal = format!(
+                    "a shell needs only {n_shell} vertices, and sleeves {n_sleeves}: use the kind skeleton for sleeves"
+                );
+                with_refusal(shell, refusal)
+            } else if own <= other {
                 made
             } else {
                 let refusal = format!(
@@ -289,6 +297,29 @@ mod tests {
         assert!(error.to_string().contains("clearance"), "{error}");
         let error = made(&Figure { triangles: vec![[0, 1, 9]], ..figure }, &skeleton).unwrap_err();
         assert!(matches!(error, CageGenError::Index { vertex: 9, .. }), "{error}");
+    }
+
+    /// A cylinder of 48 sides needs 20 vertices; its rims look like limbs, and sleeves along them take more.
+    #[test]
+    fn a_simple_shape_keeps_its_shell() {
+        let (n, ends) = (48, [0u32, 1]);
+        let rim = |end: u32| {
+            (0..n).map(move |k| {
+                let (sin, cos) = (k as f32 * std::f32::consts::TAU / n as f32).sin_cos();
+                Vec3::new(0.3 * cos, 2.0 * end as f32, 0.3 * sin)
+            })
+        };
+        let positions: Vec<Vec3> = ends.into_iter().flat_map(rim).collect();
+        let cap = |end: u32| (1..n - 1).map(move |k| [n * end, n * end + k, n * end + k + 1]);
+        let side = (0..n).flat_map(|k| [[k, (k + 1) % n, n + k], [(k + 1) % n, n + (k + 1) % n, n + k]]);
+        let triangles: Vec<[u32; 3]> = ends.into_iter().flat_map(cap).chain(side).collect();
+        let options = CageOptions::default();
+        let made = generate_of_kind(&positions, &triangles, None, &options, &NoProgress).unwrap();
+        assert!(
+            made.report.vertices <= 24 && 10 * made.report.quads >= 7 * made.report.faces,
+            "{:?}",
+            made.report
+        );
     }
 
     #[test]
