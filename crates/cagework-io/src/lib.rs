@@ -34,6 +34,7 @@ mod shown;
 mod siblings;
 mod splats;
 mod stl;
+mod surface;
 mod textures;
 mod threemf;
 mod timeline;

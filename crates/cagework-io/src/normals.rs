@@ -1,14 +1,10 @@
-//! Normals of deformed shapes.
-//!
-//! Original normals can carry hard edges and artistic weighting, so they are rotated and not recomputed:
-//! area-weighted normals are computed at rest and after deformation, and the rotation between them is applied
-//! to the original normal and tangent. An undeformed shape keeps its normals exactly.
+//! Smooth surfaces of vertices with normals.
 //!
 //! Vertices at the same rest position belong to one smooth surface if their normals agree (a UV seam);
 //! otherwise a hard edge separates them. Without normals, smoothing groups define the surfaces.
 
 use cagework_core::mesh::weld;
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Vec3};
 
 /// Cosine of 2.5 degrees. Normals at a smaller angle differ only by rounding or by 8-bit quantisation.
 const MIN_SAME_NORMAL_COS: f32 = 0.999;
@@ -21,9 +17,9 @@ pub(crate) struct Shading {
     pub(crate) vertex: Vec<u32>,
     /// Unit normal of each shading vertex; area-weighted if the model has no normals.
     pub(crate) normal: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    /// Indices of shading vertices.
+    pub(crate) triangles: Vec<[u32; 3]>,
     cluster: Vec<u32>,
-    rest: Vec<Vec3>,
 }
 
 impl Shading {
@@ -61,11 +57,11 @@ impl Shading {
                 n_clusters - 1
             }));
         }
-        let mut shading = Self { vertex, normal: Vec::new(), triangles, cluster, rest: Vec::new() };
-        shading.rest = shading.area_weighted(positions, n_clusters as usize);
+        let mut shading = Self { vertex, normal: Vec::new(), triangles, cluster };
+        let smooth = shading.area_weighted(positions, n_clusters as usize);
         for (n, &c) in normal.iter_mut().zip(&shading.cluster) {
             if *n == Vec3::ZERO {
-                *n = shading.rest[c as usize];
+                *n = smooth[c as usize];
             }
             if *n == Vec3::ZERO {
                 // The vertex has neither a normal nor a face with area. Formats require a unit vector, so use any.
@@ -74,26 +70,6 @@ impl Shading {
         }
         shading.normal = normal;
         shading
-    }
-
-    /// For each shading vertex, the rotation of the normal of its surface from rest to `positions`.
-    pub(crate) fn rotations(&self, positions: &[Vec3]) -> Vec<Quat> {
-        let now = self.area_weighted(positions, self.rest.len());
-        let turns: Vec<Quat> = self
-            .rest
-            .iter()
-            .zip(&now)
-            .map(|(&a, &b)| {
-                let none = a == b || a == Vec3::ZERO || b == Vec3::ZERO;
-                if none { Quat::IDENTITY } else { Quat::from_rotation_arc(a, b) }
-            })
-            .collect();
-        self.cluster.iter().map(|&c| turns[c as usize]).collect()
-    }
-
-    /// Unit normals of the shading vertices, rotated by `rotations`.
-    pub(crate) fn normals(&self, rotations: &[Quat]) -> Vec<Vec3> {
-        rotations.iter().zip(&self.normal).map(|(&q, &n)| (q * n).normalize_or(n)).collect()
     }
 
     /// Computes the unit normal of each cluster, zero for clusters without area. Sums in f64: areas of kilometre-sized

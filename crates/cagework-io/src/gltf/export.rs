@@ -9,8 +9,8 @@ use super::patch::Rest;
 use super::scene::name_of;
 use super::{GltfDocument, Slot};
 use crate::error::WriteError;
-use crate::normals::Shading;
 use crate::obj::{ObjGroup, write_new};
+use crate::surface::{gradients, turned_normal};
 
 /// Writes a new OBJ file: vertices in the model's order, one object per primitive, texture coordinates and
 /// normals if the document has them, and material names.
@@ -19,29 +19,21 @@ pub(crate) fn write_obj(
     rest: Rest<'_>,
     positions: &[Vec3],
 ) -> Result<Vec<u8>, WriteError> {
-    let mut original = vec![Vec3::ZERO; positions.len()];
     let mut parts = Vec::with_capacity(document.slots.len());
     for slot in &document.slots {
-        let normals = world_normals(document, slot)?;
-        if let Some(normals) = &normals {
-            original[range(slot)].copy_from_slice(normals);
-        }
         parts.push(ObjGroup {
             name: part_name(document, slot),
             material: material(document, slot),
             start: slot.start,
             texcoords: texcoords(document, slot),
-            normals: normals.unwrap_or_default(),
+            normals: world_normals(document, slot)?.unwrap_or_default(),
             triangles: rest.triangles[slot.triangles.clone()].to_vec(),
         });
     }
-    let vertices = (0..positions.len() as u32).collect();
-    let shading = Shading::new(rest.positions, vertices, original, &[], rest.triangles.to_vec());
-    let new = shading.normals(&shading.rotations(positions));
+    let gradients = gradients(rest.positions, positions, rest.triangles.to_vec());
     for (part, slot) in parts.iter_mut().zip(&document.slots) {
-        if !part.normals.is_empty() {
-            part.normals.copy_from_slice(&new[range(slot)]);
-        }
+        let of_part = gradients.get(range(slot)).into_iter().flatten();
+        part.normals.iter_mut().zip(of_part).for_each(|(n, &gradient)| *n = turned_normal(gradient, *n));
     }
     Ok(write_new(positions, rest.origin, &parts))
 }

@@ -1,7 +1,7 @@
 //! Writes deformed shapes into the original glTF document.
 //!
-//! * POSITION is transformed back by the inverse of the node's world transform. NORMAL and TANGENT rotate
-//!   with the surface ([`crate::normals`]). Primitives without normals get none; viewers shade them flat.
+//! * POSITION is transformed back by the inverse of the node's world transform. NORMAL and TANGENT follow
+//!   the gradient of the deformation ([`crate::surface`]). Primitives without normals get none; viewers shade them flat.
 //! * A mesh shown by several nodes is duplicated, since each node deforms it differently.
 //! * A skinned mesh loses its skin and moves to a new root node, because the deformed vertices are already in
 //!   world space. The same applies to a mesh under a singular transform.
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use ::gltf::json::mesh::Semantic;
-use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::animate::{self, MeshPlacement, Pose, PoseClip};
@@ -21,8 +21,8 @@ use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Rig, Slot};
 use crate::error::WriteError;
-use crate::normals::Shading;
 use crate::origin::translation;
+use crate::surface::{gradients, turned_normal};
 
 /// Threshold for |det| / product of column lengths, below which a transform counts as singular in f32.
 const MIN_RELATIVE_DETERMINANT: f64 = 1e-9;
@@ -60,35 +60,37 @@ pub(crate) fn patch(
     let mut pack = Pack::of(document);
     embed_images(document, &mut json, &mut pack);
     let places = place_meshes(document, &mut json, rest.origin);
-    let normals = Normals::new(document, rest)?;
-    let rotations = normals.shading.rotations(base);
+    let normals =
+        document.slots.iter().map(|slot| world_normals(document, slot)).collect::<Result<Vec<_>, _>>()?;
+    let turns = |to: &[Vec3]| gradients(rest.positions, to, rest.triangles.to_vec());
+    let of_base = turns(base);
     let mut shapes = Vec::with_capacity(document.slots.len());
-    for (slot, has_normals) in document.slots.iter().zip(&normals.present) {
+    for (slot, normals) in document.slots.iter().zip(&normals) {
         let place = &places[slot.instance as usize];
-        let shape = Shape::new(slot, place, *has_normals, &normals.shading, base, &rotations);
-        let tangents = tangents(document, slot, place, &shape, &rotations)?;
+        let shape = Shape::new(slot, place, normals.as_deref(), base, &of_base);
+        let tangents = if normals.is_some() { tangents(document, slot, place, &of_base)? } else { None };
         let flip = place.detached && is_mirrored(document, slot)?;
         let indices = flip.then(|| {
             let corners = rest.triangles[slot.triangles.clone()].iter().flatten().map(|&v| v - slot.start);
             pack.push_indices(&mut json, corners)
         });
         let position = pack.push_vec3(&mut json, &shape.positions, true);
-        let normal = has_normals.then(|| pack.push_vec3(&mut json, &shape.normals, false));
+        let normal = normals.as_ref().map(|_| pack.push_vec3(&mut json, &shape.normals, false));
         let tangent = tangents.map(|t| pack.push_floats(&mut json, &t, 4, true, false));
         let primitive = &mut json["meshes"][place.mesh]["primitives"][slot.primitive as usize];
         patch_primitive(primitive, place.detached, Some(position), normal, tangent, indices);
         shapes.push(shape);
     }
     for pose in poses {
-        let rotations = normals.shading.rotations(pose.positions);
-        for ((slot, base), has_normals) in document.slots.iter().zip(&shapes).zip(&normals.present) {
+        let of_pose = turns(pose.positions);
+        for ((slot, base), normals) in document.slots.iter().zip(&shapes).zip(&normals) {
             let place = &places[slot.instance as usize];
-            let shape = Shape::new(slot, place, *has_normals, &normals.shading, pose.positions, &rotations);
+            let shape = Shape::new(slot, place, normals.as_deref(), pose.positions, &of_pose);
             let delta =
                 |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(&a, &b)| a - b).collect() };
             let positions = delta(&shape.positions, &base.positions);
             let mut target = json!({ "POSITION": pack.push_vec3(&mut json, &positions, true) });
-            if *has_normals {
+            if normals.is_some() {
                 target["NORMAL"] =
                     pack.push_vec3(&mut json, &delta(&shape.normals, &base.normals), false).into();
             }
@@ -240,29 +242,6 @@ fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usi
     node
 }
 
-struct Normals {
-    shading: Shading,
-    /// For each slot, whether the file has normals.
-    present: Vec<bool>,
-}
-
-impl Normals {
-    fn new(document: &GltfDocument, rest: Rest<'_>) -> Result<Self, WriteError> {
-        let mut normals = vec![Vec3::ZERO; rest.positions.len()];
-        let mut present = Vec::new();
-        for slot in &document.slots {
-            let world = world_normals(document, slot)?;
-            present.push(world.is_some());
-            if let Some(world) = world {
-                normals[slot.start as usize..][..slot.count as usize].copy_from_slice(&world);
-            }
-        }
-        let vertices = (0..rest.positions.len() as u32).collect();
-        let shading = Shading::new(rest.positions, vertices, normals, &[], rest.triangles.to_vec());
-        Ok(Self { shading, present })
-    }
-}
-
 /// Vertices of a primitive after the deformation, in mesh space.
 struct Shape {
     positions: Vec<Vec3>,
@@ -270,24 +249,23 @@ struct Shape {
 }
 
 impl Shape {
+    /// `normals`: at rest in world space, if the file has any. `gradients`: of all vertices.
     fn new(
         slot: &Slot,
         place: &MeshPlacement,
-        has_normals: bool,
-        shading: &Shading,
+        normals: Option<&[Vec3]>,
         positions: &[Vec3],
-        rotations: &[Quat],
+        gradients: &[Option<DMat3>],
     ) -> Self {
         let range = slot.start as usize..(slot.start + slot.count) as usize;
         let world_from_mesh = DMat3::from_mat4(place.mesh_from_world.inverse());
         let to_mesh = |p: &Vec3| place.mesh_from_world.transform_point3(p.as_dvec3()).as_vec3();
-        let normal = |v: usize| {
-            let world = (rotations[v] * shading.normal[v]).as_dvec3();
-            unit(world_from_mesh.transpose() * world).as_vec3()
+        let normal = |(&n, &gradient): (&Vec3, &Option<DMat3>)| {
+            unit(world_from_mesh.transpose() * turned_normal(gradient, n).as_dvec3()).as_vec3()
         };
         Self {
             positions: positions[range.clone()].iter().map(to_mesh).collect(),
-            normals: if has_normals { range.map(normal).collect() } else { Vec::new() },
+            normals: normals.into_iter().flatten().zip(&gradients[range]).map(normal).collect(),
         }
     }
 }
@@ -296,27 +274,20 @@ fn unit(v: DVec3) -> DVec3 {
     v.normalize_or(DVec3::Z)
 }
 
-/// Tangents rotated with the surface and orthogonal to the new normals; `None` without original tangents.
+/// Tangents after the deformation, in mesh space; `None` without original tangents.
 fn tangents(
     document: &GltfDocument,
     slot: &Slot,
     place: &MeshPlacement,
-    shape: &Shape,
-    rotations: &[Quat],
+    gradients: &[Option<DMat3>],
 ) -> Result<Option<Vec<f32>>, WriteError> {
-    let Some(world) = world_tangents(document, slot)?.filter(|_| !shape.normals.is_empty()) else {
-        return Ok(None);
-    };
-    let mut out = Vec::with_capacity(4 * world.len());
-    for (k, (tangent, handedness)) in world.into_iter().enumerate() {
-        let turned = (rotations[slot.start as usize + k] * tangent).as_dvec3();
-        let local = place.mesh_from_world.transform_vector3(turned).normalize_or_zero();
-        let normal = shape.normals[k].as_dvec3();
-        let fallback = normal.any_orthonormal_vector();
-        let t = (local - normal * local.dot(normal)).normalize_or(fallback).as_vec3();
-        out.extend([t.x, t.y, t.z, handedness]);
-    }
-    Ok(Some(out))
+    let Some(world) = world_tangents(document, slot)? else { return Ok(None) };
+    let turned = world.into_iter().zip(&gradients[slot.start as usize..]).flat_map(|((t, handedness), g)| {
+        let world = g.unwrap_or(DMat3::IDENTITY) * t.as_dvec3();
+        let t = place.mesh_from_world.transform_vector3(world).normalize_or_zero().as_vec3();
+        [t.x, t.y, t.z, handedness]
+    });
+    Ok(Some(turned.collect()))
 }
 
 /// Whether [`super::geometry::read`] reversed the triangles, because the transform mirrors them.

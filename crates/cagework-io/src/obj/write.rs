@@ -10,15 +10,27 @@ use super::lex::{lines, tokens};
 use super::read::{MIN_CORNERS, NONE, ObjDocument};
 use crate::normals::Shading;
 use crate::origin::Coordinate;
+use crate::surface::{gradients, turned_normal};
 
 /// Distinct pairs (vertex, normal) at the corners of a file; at corners without normal, pairs (vertex, smooth surface).
 pub(crate) struct Pairs {
-    /// The pairs as shading vertices, whose normals rotate with the surface.
+    /// The pairs as shading vertices.
     pub(crate) shading: Shading,
     /// Index of the pair at each corner of the file's faces. `[n_corners]`
     pub(crate) of_corner: Vec<u32>,
     /// Index of the `vn` line of each pair, or [`NONE`].
     pub(crate) vn: Vec<u32>,
+}
+
+impl Pairs {
+    /// Normals of the pairs after the vertices have moved from `rest` to `positions`.
+    fn normals(&self, rest: &[Vec3], positions: &[Vec3]) -> Vec<Vec3> {
+        let Shading { vertex, normal, triangles, .. } = &self.shading;
+        let [from, to] =
+            [rest, positions].map(|at| vertex.iter().map(|&v| at[v as usize]).collect::<Vec<_>>());
+        let gradients = gradients(&from, &to, triangles.clone());
+        gradients.into_iter().zip(normal).map(|(gradient, &n)| turned_normal(gradient, n)).collect()
+    }
 }
 
 impl ObjDocument {
@@ -109,7 +121,7 @@ struct PatchedNormals {
 impl PatchedNormals {
     fn new(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -> Self {
         let pairs = document.pairs(rest);
-        let new = pairs.shading.normals(&pairs.shading.rotations(positions));
+        let new = pairs.normals(rest, positions);
         let mut users: Vec<Vec<u32>> = vec![Vec::new(); document.normals.len()];
         for (pair, &vn) in pairs.vn.iter().enumerate() {
             if vn != NONE {

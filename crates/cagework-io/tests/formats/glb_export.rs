@@ -1,7 +1,7 @@
 //! GLB export: the deformed shape in the original document.
 
 use cagework_io::{Model, ModelFormat, Timeline};
-use glam::Vec3;
+use glam::{EulerRot, Quat, Vec3};
 use serde_json::{Value, json};
 
 use crate::common::{
@@ -117,7 +117,56 @@ fn seams_stay_smooth() {
     let normals = attribute(&model.write_glb(&folded).unwrap(), "NORMAL", 3);
     // Vertices 0 and 3, and 2 and 4, are coincident.
     assert_eq!((&normals[0], &normals[2]), (&normals[3], &normals[4]));
-    assert!((normals[0][2] - 1.0).abs() < 1e-6, "two mirrored slopes average to upright: {:?}", normals[0]);
+    // At vertex 0, the least squares over the edges to z = 1 at (1, 0) and (0, 1), and twice to z = 0 at (1, 1), have the
+    // slopes 1 / 5.
+    let expected = Vec3::new(-0.2, -0.2, 1.0).normalize();
+    assert!(Vec3::from_slice(&normals[0]).distance(expected) < 1e-6, "{:?}", normals[0]);
+}
+
+/// A rotation turns a stored normal and a tangent, whatever the normal of the face is. Each face of a doubled sheet has a
+/// copy that faces the other way, so that the sheet has no mean normal.
+#[test]
+fn oblique_normals_of_single_and_doubled_sheets_turn_with_the_surface() {
+    let (normal, tangent) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.8, 0.0, -0.6));
+    let at = [[0.1, 0.0, 0.3], [1.0, 0.1, 0.3], [1.1, 1.0, 0.3], [0.0, 0.7, 0.3]];
+    for sides in [1, 2] {
+        let mut b = Builder::new();
+        let corners = [0, 1, 2, 0, 2, 3, 2, 1, 0, 3, 2, 0];
+        let tangents = tangent.extend(1.0).to_array().repeat(4);
+        let attributes = json!({
+            "POSITION": b.vec3(&at), "NORMAL": b.vec3(&[normal.to_array(); 4]),
+            "TANGENT": b.accessor(&common::floats(&tangents), common::F32, 4, "VEC4"),
+        });
+        let indices = b.indices(&corners[..6 * sides]);
+        b.push("meshes", json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }));
+        b.json["nodes"] = json!([{ "mesh": 0 }]);
+        let model = read("x.glb", &b.glb()).unwrap();
+        let text = at.map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
+        let faces = ["f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n", "f 3//1 2//1 1//1\nf 4//1 3//1 1//1\n"];
+        let obj = format!("{text}vn 0.6 0 0.8\n{}", faces[..sides].concat());
+        let obj = read("x.obj", obj.as_bytes()).unwrap();
+        for turn in [Quat::from_rotation_z(1.2), Quat::from_euler(EulerRot::XYZ, 0.7, -0.4, 1.1)] {
+            let turned: Vec<Vec3> = model.positions.iter().map(|&p| turn * p).collect();
+            let from_obj = obj.write_glb(&turned).unwrap();
+            let glb = model.write_glb(&turned).unwrap();
+            let near = |found: &[f32], expected: Vec3, what: &str| {
+                let off = Vec3::from_slice(found).distance(turn * expected);
+                assert!(off < 1e-5, "{sides} sides, {what}: {found:?}");
+            };
+            attribute(&glb, "NORMAL", 3).iter().for_each(|n| near(n, normal, "GLB"));
+            attribute(&glb, "TANGENT", 4).iter().for_each(|t| near(t, tangent, "tangent"));
+            attribute(&from_obj, "NORMAL", 3).iter().for_each(|n| near(n, normal, "GLB of an OBJ"));
+            for obj in [obj.write_obj(&turned).unwrap(), model.write_obj(&turned).unwrap()] {
+                let obj = String::from_utf8(obj).unwrap();
+                let lines: Vec<&str> = obj.lines().filter_map(|line| line.strip_prefix("vn ")).collect();
+                assert_eq!(lines.len(), 4);
+                for line in lines {
+                    let found: Vec<f32> = line.split(' ').map(|x| x.parse().unwrap()).collect();
+                    near(&found, normal, "OBJ");
+                }
+            }
+        }
+    }
 }
 
 #[test]

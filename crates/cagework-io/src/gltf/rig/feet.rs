@@ -20,12 +20,12 @@ use serde_json::{Value, json};
 use super::clip::{Clip, clips, quaternion, vector};
 use super::edit::Edit;
 use super::nodes::holders;
-use super::surface::rotation;
 use crate::error::WriteError;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
 use crate::gltf::scene::{Worlds, local};
 use crate::gltf::{self, GltfDocument};
+use crate::surface::rotation;
 
 /// Largest speed of a planted ankle, leg lengths per second. The swinging foot of a walk is about ten times as fast.
 const MAX_SPEED: f64 = 0.3;

@@ -26,7 +26,6 @@ mod reshape;
 mod rest;
 mod shape;
 mod skeleton;
-mod surface;
 mod tracks;
 mod vrm;
 

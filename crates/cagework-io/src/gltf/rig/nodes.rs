@@ -8,12 +8,12 @@ use cagework_pose::parts::Motion;
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
-use super::surface::rotation;
 use super::tracks::NodeChange;
 use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::scene::{local, name_of};
+use crate::surface::rotation;
 
 cagework_core::choice! {
     /// How the skeleton follows the cage.

@@ -5,10 +5,10 @@ use std::cell::OnceCell;
 use ::gltf::json::mesh::Semantic;
 use glam::{DMat3, DMat4, DVec3};
 
-use super::surface::{Surface, cofactor};
 use super::{Rig, RigPrimitive};
 use crate::gltf::GltfError;
 use crate::gltf::geometry::{Frame, attribute, vectors};
+use crate::surface::{Surface, cofactor};
 
 /// Condition number above which a skinning matrix counts as singular.
 const MAX_CONDITION: f64 = 1e4;

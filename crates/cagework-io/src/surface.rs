@@ -1,4 +1,7 @@
 //! Deformation gradients at the vertices of a surface.
+//!
+//! Stored normals can carry hard edges and artistic weighting, so exports do not recompute them. The cofactor matrix of
+//! the gradient transforms normals, and the gradient transforms tangents.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -20,8 +23,11 @@ const NORMAL_WEIGHTS: [f64; 2] = [1e-4, 1.0];
 /// such as hair or a cape.
 const MIN_FACING_COS: f64 = -0.5;
 
+/// Largest sum of areas that counts as zero, as a fraction of the sum of their lengths.
+const MAX_CANCELLED: f64 = 1e-6;
+
 /// Triangles for estimating gradients by least squares over the edges at each vertex.
-pub(super) struct Surface {
+pub(crate) struct Surface {
     triangles: Vec<[u32; 3]>,
     /// Merged index of each vertex. Coincident vertices merge if their positions after the deformation also coincide
     /// and they are not on opposite sides of a sheet. `[n]`
@@ -32,17 +38,23 @@ pub(super) struct Surface {
 impl Surface {
     /// Groups coincident vertices. `from` and `to`: positions of the vertices before and after the deformation.
     /// `triangles`: indices of these vertices.
-    pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
+    pub(crate) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
         let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let origin = origin_near(&world);
         let places: Vec<Vec3> = from.iter().map(|&p| relative(p, origin)).collect();
         let welded = weld(&places);
-        let mut normals = vec![DVec3::ZERO; from.len()];
+        let (mut normals, mut sizes) = (vec![DVec3::ZERO; from.len()], vec![0.0_f64; from.len()]);
         for triangle in &triangles {
             let [a, b, c] = triangle.map(|v| from[v as usize]);
-            triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
+            let area = (b - a).cross(c - a);
+            for &v in triangle {
+                normals[v as usize] += area;
+                sizes[v as usize] += area.length();
+            }
         }
-        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+        for (normal, size) in normals.iter_mut().zip(sizes) {
+            *normal = if cancels(*normal, size) { DVec3::ZERO } else { normal.normalize_or_zero() };
+        }
         // For each position, the groups of merged vertices there: the first vertex and the index of each group.
         let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_unique = 0;
@@ -66,13 +78,13 @@ impl Surface {
     /// and, with a small weight, over the normals before and after as one more pair of vectors. The ratio of their lengths
     /// is the mean stretch of the surface, the square root of the ratio of the areas around the vertex. `None` if no
     /// adjacent triangle has moved. `[n]`
-    pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
+    pub(crate) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
 
     /// Like [`Self::gradients`], for a state that differs only at the vertices `changed` from a state whose gradients
     /// are `others`.
-    pub(super) fn gradients_near(
+    pub(crate) fn gradients_near(
         &self,
         from: &[DVec3],
         to: &[DVec3],
@@ -97,6 +109,8 @@ impl Surface {
         others: &[Option<DMat3>],
     ) -> Vec<Option<DMat3>> {
         let mut normals = vec![[DVec3::ZERO; 2]; self.n_unique];
+        // The same sums with each triangle turned over that faces away from the sum of the previous ones.
+        let mut aligned = normals.clone();
         let mut sizes = vec![[0.0_f64; 2]; self.n_unique];
         let mut sums = vec![(DMat3::ZERO, DMat3::ZERO, 0.0_f64); self.n_unique];
         let mut moved = vec![false; self.n_unique];
@@ -111,8 +125,10 @@ impl Surface {
             for k in 0..3 {
                 let unique = self.unique_of[corners[k]] as usize;
                 moved[unique] |= has_moved;
+                let sign = if areas[0].dot(aligned[unique][0]) < 0.0 { -1.0 } else { 1.0 };
                 for (k, area) in areas.into_iter().enumerate() {
                     normals[unique][k] += area;
+                    aligned[unique][k] += sign * area;
                     sizes[unique][k] += area.length();
                 }
                 let (both, one, length) = &mut sums[unique];
@@ -130,7 +146,9 @@ impl Surface {
                     return None;
                 }
                 let (both, one, length) = sums[v];
-                let [n, m] = normals[v].map(DVec3::normalize_or_zero);
+                let is_doubled = cancels(normals[v][0], sizes[v][0]);
+                let normals = if is_doubled { aligned[v] } else { normals[v] };
+                let [n, m] = normals.map(DVec3::normalize_or_zero);
                 let stretch = (sizes[v][1] / sizes[v][0]).sqrt();
                 let stretch = if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 };
                 let scale = 1.0 / length.max(1e-30);
@@ -152,7 +170,7 @@ impl Surface {
     }
 
     /// Replaces each unknown value by the mean of the known values at adjacent vertices, or by zero if there are none.
-    pub(super) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
+    pub(crate) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
         let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
         for triangle in &self.triangles {
             for &v in triangle {
@@ -170,19 +188,36 @@ impl Surface {
     }
 }
 
+/// Computes the gradient of the map from `from` to `to` at each vertex ([`Surface::gradients`]). `[n_vertices]`
+pub(crate) fn gradients(from: &[Vec3], to: &[Vec3], triangles: Vec<[u32; 3]>) -> Vec<Option<DMat3>> {
+    let [from, to] = [from, to].map(|all| all.iter().map(|p| p.as_dvec3()).collect::<Vec<_>>());
+    Surface::new(&from, &to, triangles).gradients(&from, &to)
+}
+
+/// Transforms a unit normal; without a gradient, it stays unchanged.
+pub(crate) fn turned_normal(gradient: Option<DMat3>, normal: Vec3) -> Vec3 {
+    gradient.map_or(normal, |g| (cofactor(g) * normal.as_dvec3()).normalize_or(normal.as_dvec3()).as_vec3())
+}
+
+/// Whether a sum of areas is only rounding, because every face has a copy that faces the other way. `size`: sum of the
+/// lengths.
+fn cancels(sum: DVec3, size: f64) -> bool {
+    sum.length() <= MAX_CANCELLED * size
+}
+
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
 /// Cofactor matrix, which transforms normals; negated for mirroring maps, so that normals point outwards.
-pub(super) fn cofactor(m: DMat3) -> DMat3 {
+pub(crate) fn cofactor(m: DMat3) -> DMat3 {
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     sign * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
 /// Computes the nearest rotation by Newton's iteration for the polar decomposition; `None` if the matrix is singular or
 /// mirrors. See Higham and Noferini (2016).
-pub(super) fn rotation(m: DMat3) -> Option<DMat3> {
+pub(crate) fn rotation(m: DMat3) -> Option<DMat3> {
     let mut turn = m * (1.0 / m.determinant().abs().cbrt());
     for _ in 0..30 {
         let next = 0.5 * (turn + turn.inverse().transpose());
