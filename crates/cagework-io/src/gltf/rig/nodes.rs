@@ -55,8 +55,8 @@ pub(super) struct NodeUpdate {
     /// translation, a rotation and a scale cannot express the shear.
     pub(super) sheared: Vec<u32>,
     pub(super) n_moved: usize,
-    /// Number of joints outside the cage that carry vertices.
-    pub(super) n_outside: usize,
+    /// Joints and nodes outside the cage that carry vertices and move like vertices outside the cage.
+    pub(super) outside: Vec<u32>,
     /// Number of joints outside the cage that carry no vertices. These joints follow their parent.
     pub(super) n_follow_parent: usize,
 }
@@ -68,6 +68,8 @@ pub(super) struct NodeMove {
     pub(super) turn: DMat3,
     /// Scale factor of clip translations.
     pub(super) ratio: f64,
+    /// Rotation about the up axis of the clip translations of a node at the top.
+    pub(super) heading: DMat3,
     /// Whether the cage can move none of the nodes above. Constant translations of such a node are positions, not
     /// lengths of a bone.
     pub(super) is_top: bool,
@@ -212,11 +214,31 @@ impl Rig<'_> {
         self.follows.iter().filter(|(node, _)| props.contains(node)).map(of).collect()
     }
 
+    /// Fits the rigid motion of the vertices inside the cage that the unskinned meshes at a node and below it have.
+    /// `None` for a joint of a skin, and with fewer than [`MIN_RIGID_VERTICES`].
+    fn carried(&self, node: u32, given: &Deformation<'_>) -> Option<Motion> {
+        let mut joints = self.document.root.skins.iter().flat_map(|skin| &skin.joints);
+        if joints.any(|joint| joint.value() == node as usize) {
+            return None;
+        }
+        let mut is_below = vec![false; self.held.len()];
+        is_below[node as usize] = true;
+        self.worlds.mark_below(&mut is_below);
+        let is_carried = |part: &&super::RigPrimitive| {
+            part.instance.skin.is_none() && part.instance.node.is_some_and(|node| is_below[node as usize])
+        };
+        let points = self.parts.iter().filter(is_carried).flat_map(|part| (part.first..).zip(part.rest()));
+        let inside = points.filter(|&(v, _)| !given.is_outside[v]);
+        let inside: Vec<(DVec3, DVec3)> = inside.map(|(v, rest)| (rest, given.by[v])).collect();
+        (inside.len() >= MIN_RIGID_VERTICES).then(|| Motion::of(&inside))
+    }
+
     /// Moves the nodes that follow the cage: writes their transforms to `json` and returns their changes.
     pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
-        let still = NodeMove { by: DVec3::ZERO, turn: DMat3::IDENTITY, ratio: 1.0, is_top: true };
+        let heading = DMat3::IDENTITY;
+        let still = NodeMove { by: DVec3::ZERO, turn: DMat3::IDENTITY, ratio: 1.0, heading, is_top: true };
         let mut moved = NodeUpdate {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
@@ -224,7 +246,7 @@ impl Rig<'_> {
             moves: vec![still; n],
             sheared: Vec::new(),
             n_moved: 0,
-            n_outside: 0,
+            outside: Vec::new(),
             n_follow_parent: 0,
         };
         if given.joints == Joints::Stay && given.rigid.is_empty() {
@@ -234,11 +256,13 @@ impl Rig<'_> {
         let new = self.place(given, &anchors, &mut moved);
         let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
         if travels {
-            let ratios = self.ratios(given, &moved.moves);
-            // Joints that are missing in the shared skeleton get the factor of another joint.
-            let one = (0..n).find_map(|i| given.named_move(i)).map(|named| named.ratio);
-            for (i, ratio) in ratios.into_iter().enumerate() {
-                moved.moves[i].ratio = given.named_move(i).map(|named| named.ratio).or(one).unwrap_or(ratio);
+            let travel = self.travel(given, &moved.moves);
+            // Joints that are missing in the shared skeleton travel like another joint.
+            let travel_of = |named: NodeMove| (named.ratio, named.heading);
+            let one = (0..n).find_map(|i| given.named_move(i)).map(travel_of);
+            for (i, own) in travel.into_iter().enumerate() {
+                let of = &mut moved.moves[i];
+                (of.ratio, of.heading) = given.named_move(i).map(travel_of).or(one).unwrap_or(own);
             }
         }
         let old = &self.worlds.world;
@@ -274,12 +298,18 @@ impl Rig<'_> {
     ) -> Option<NodeChange> {
         let old = self.worlds.world[i];
         let from = local(&self.document.root.nodes[i]);
-        let NodeMove { ratio, is_top, .. } = moved.moves[i];
-        let moving = DMat3::from_diagonal(DVec3::splat(ratio));
+        let NodeMove { ratio, heading, is_top, .. } = moved.moves[i];
+        let mut moving = DMat3::from_diagonal(DVec3::splat(ratio));
+        if is_top && heading != DMat3::IDENTITY {
+            // Translations are in the frame of the parent, the heading is in world space.
+            let [above, above_new] = [above, above_new].map(DMat3::from_mat4);
+            let turned = above_new.inverse() * heading * above * moving;
+            moving = if turned.is_finite() { turned } else { moving };
+        }
         if new == old && above == above_new {
             // A root that stays where it is, such as one on the floor outside the cage, travels with the skeleton.
             let at = from.w_axis.truncate();
-            return (is_top && ratio != 1.0).then_some(NodeChange {
+            return (is_top && moving != DMat3::IDENTITY).then_some(NodeChange {
                 from: at,
                 to: at,
                 still: moving,
@@ -354,7 +384,11 @@ impl Rig<'_> {
                 (None, Some(at)) => {
                     let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
                     let follows_parent = given.is_outside[at] && !holds;
-                    moved.n_outside += usize::from(given.is_outside[at] && holds);
+                    let carried =
+                        if given.is_outside[at] && holds { self.carried(node, given) } else { None };
+                    if given.is_outside[at] && holds && carried.is_none() {
+                        moved.outside.push(node);
+                    }
                     moved.n_follow_parent += usize::from(follows_parent);
                     movable[i] |= !follows_parent;
                     // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a chain,
@@ -362,10 +396,15 @@ impl Rig<'_> {
                     let by = if follows_parent {
                         parent.map_or(DVec3::ZERO, |p| moves[p].by)
                     } else {
-                        given.by[at]
+                        let at_pivot = |motion: &Motion| motion.by(old[i].w_axis.truncate());
+                        carried.as_ref().map_or(given.by[at], at_pivot)
+                    };
+                    let gradient = || match &carried {
+                        Some(motion) => DMat3::from_mat4(motion.transform()),
+                        None => gradient(given.by, at, self.diagonal),
                     };
                     let turns = given.joints == Joints::Turn;
-                    let turn = turns.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
+                    let turn = turns.then(|| rotation(gradient())).flatten();
                     (by, turn.unwrap_or(DMat3::IDENTITY))
                 }
                 (None, None) => {
@@ -389,13 +428,15 @@ impl Rig<'_> {
         new
     }
 
-    /// Computes the scale factors of clip translations, by node. All nodes of a skeleton share one factor; otherwise,
-    /// feet would detach from legs.
+    /// Computes scale factor and rotation of clip translations, by node. All nodes of a skeleton share one factor;
+    /// otherwise, feet would detach from legs.
     ///
+    /// The rotation is the part about the up axis of the rotation of the node inside the cage that, together with its
+    /// descendants, carries the most vertices. Travel along the ground stays on the ground if the hips are tilted.
     /// The factor is the height of the hips above the skeleton's lowest vertex after the deformation, divided by this
     /// height before the deformation, within [`TRAVEL_SCALE_RANGE`]. The hips are the node above the floor that,
     /// together with its descendants, carries the most vertices.
-    fn ratios(&self, given: &Deformation<'_>, moves: &[NodeMove]) -> Vec<f64> {
+    fn travel(&self, given: &Deformation<'_>, moves: &[NodeMove]) -> Vec<(f64, DMat3)> {
         let (skeletons, n_skeletons) = self.skeletons();
         let mut carried = self.held.clone();
         for &(node, parent) in self.worlds.order.iter().rev() {
@@ -419,9 +460,13 @@ impl Rig<'_> {
             }
         }
         let mut hips = vec![(0.0, 1.0); n_skeletons];
-        for &(node, _) in &self.follows {
+        let mut headings = vec![(0.0, DMat3::IDENTITY); n_skeletons];
+        for &(node, point) in &self.follows {
             let i = node as usize;
             let Some(skeleton) = skeletons[i] else { continue };
+            if carried[i] > headings[skeleton].0 && !given.is_outside[point] {
+                headings[skeleton] = (carried[i], about(moves[i].turn, given.up));
+            }
             let at = self.worlds.world[i].w_axis.truncate();
             let heights = |corners: [DVec3; 2]| {
                 let [a, b] = corners.map(|corner| corner.dot(given.up));
@@ -436,7 +481,8 @@ impl Rig<'_> {
                 hips[skeleton] = (carried[i], (now / before).clamp(least * change, most * change));
             }
         }
-        skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()
+        let of = |skeleton: usize| (hips[skeleton].1, headings[skeleton].1);
+        skeletons.iter().map(|skeleton| skeleton.map_or((1.0, DMat3::IDENTITY), of)).collect()
     }
 
     /// Returns the skeleton index of each node that follows the cage, and a number that is larger than all these
@@ -467,6 +513,14 @@ impl Rig<'_> {
         let skeletons = (0..n).map(|node| follows[node].then(|| top(&above, node)));
         (skeletons.collect(), n + 1)
     }
+}
+
+/// The part of a rotation about `axis`, after the shortest rotation that moves the axis as the whole does is removed.
+fn about(turn: DMat3, axis: DVec3) -> DMat3 {
+    let turn = DQuat::from_mat3(&turn);
+    let along = turn.xyz().dot(axis) * axis;
+    let twist = DQuat::from_xyzw(along.x, along.y, along.z, turn.w);
+    if twist.length() > 1e-6 { DMat3::from_quat(twist.normalize()) } else { DMat3::IDENTITY }
 }
 
 /// Sets the local transform of a node and of its JSON. A node with a matrix gets a matrix, another one a translation

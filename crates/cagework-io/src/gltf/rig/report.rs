@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::ground::Ground;
 use super::lattice::MAX_ENDS;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Counts and measures of reshaping a document.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -15,6 +16,9 @@ pub struct ReshapeReport {
     pub joints_moved: usize,
     /// Number of joints outside the cage that carry vertices. They move like vertices outside the cage.
     pub joints_outside: usize,
+    /// Their names.
+    #[serde(skip)]
+    pub names_outside: Vec<String>,
     /// Number of joints outside the cage that carry no vertices. They follow their parent.
     pub joints_following_parent: usize,
     /// Number of ends of morph targets. An end is a vertex with one target at weight 0 or 1.
@@ -66,12 +70,13 @@ impl ReshapeReport {
         notice(
             *joints_outside,
             format!(
-                "{} outside the cage: near it they follow it, farther away they stay",
+                "{} outside the cage ({}): near it they follow it, farther away they stay",
                 counted(
                     *joints_outside,
                     "joint or node with vertices is",
                     "joints or nodes with vertices are"
-                )
+                ),
+                shown_start(&self.names_outside.join(", "), MAX_NAME_CHARS)
             ),
         );
         notice(

@@ -24,6 +24,7 @@ use super::{Rig, RigPrimitive, expressions, feet, key_of, lift, poses, tracks, v
 use crate::error::WriteError;
 use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
+use crate::gltf::scene::name_of;
 use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
 use crate::timeline::Timeline;
@@ -126,7 +127,9 @@ pub(crate) fn reshape(
         let given = Deformation { by, is_outside, joints, keep_travel, rigid: &motions, named, up };
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
-        report.joints_outside = moved.n_outside;
+        report.joints_outside = moved.outside.len();
+        report.names_outside =
+            moved.outside.iter().map(|&node| name_of(&document.json, "nodes", node, "node")).collect();
         report.joints_following_parent = moved.n_follow_parent;
         let binds = write_binds(rig, &mut edit, (by, &moved.world));
         // Vertices of rigid meshes stay, unless their node cannot move rigidly.

@@ -188,7 +188,7 @@ impl Rig<'_> {
             let Some(body) = bodies[node] else { continue };
             let mut own = NodeMove { by: scale * body.moves.by, ..body.moves };
             if let Some(turn) = turned[node] {
-                own.turn = turn * own.turn * turn.transpose();
+                [own.turn, own.heading] = [own.turn, own.heading].map(|of| turn * of * turn.transpose());
             }
             if let Some(above) = parent(node)
                 && let (Some(NodeMove { by, .. }), Some(body_above)) = (of_nodes[above], bodies[above])

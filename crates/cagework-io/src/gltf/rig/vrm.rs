@@ -2,7 +2,7 @@
 //!
 //! Other VRM data refers to nodes, meshes and targets by index, which reshaping keeps.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use glam::{DMat3, DMat4, DVec3};
 use serde_json::{Value, json};
@@ -120,11 +120,20 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
 
 /// Writes the offsets that moved. `world`: updated world transforms of the nodes.
 pub(super) fn write(rig: &Rig<'_>, given: &Deformation<'_>, world: &[DMat4], json: &mut Value) {
-    let outside = rig.follows.iter().filter(|(_, at)| given.is_outside[*at]);
-    let outside: HashSet<usize> = outside.map(|(node, _)| *node as usize).collect();
-    // Points at a node outside the cage stay unchanged.
-    for point in rig.vrm_points.iter().filter(|point| !outside.contains(&point.node)) {
-        let by = given.by[point.bound_index];
+    let anchors: HashMap<usize, usize> = rig.follows.iter().map(|&(node, at)| (node as usize, at)).collect();
+    for point in &rig.vrm_points {
+        let anchor = anchors.get(&point.node).copied();
+        // Points at a node outside the cage stay unchanged.
+        if anchor.is_some_and(|at| given.is_outside[at]) {
+            continue;
+        }
+        // A point outside the cage moves with the surroundings of its node.
+        let anchor = anchor.filter(|_| given.is_outside[point.bound_index]);
+        let gradient = gradient(given.by, anchor.unwrap_or(point.bound_index), rig.diagonal);
+        let by = anchor.map_or(given.by[point.bound_index], |at| {
+            let offset = point.at - rig.worlds.world[point.node].w_axis.truncate();
+            given.by[at] + (gradient - DMat3::IDENTITY) * offset
+        });
         let has_moved = by != DVec3::ZERO || world[point.node] != rig.worlds.world[point.node];
         let at = world[point.node].inverse().transform_point3(point.at + by);
         if !has_moved || !at.is_finite() {
@@ -144,8 +153,7 @@ pub(super) fn write(rig: &Rig<'_>, given: &Deformation<'_>, world: &[DMat4], jso
                 }
             }
             VrmField::Radius(path) => {
-                let grows =
-                    DMat3::determinant(&gradient(given.by, point.bound_index, rig.diagonal)).abs().cbrt();
+                let grows = gradient.determinant().abs().cbrt();
                 if let Some(of) = json.pointer_mut(path)
                     && let Some(radius) = of.as_f64()
                 {

@@ -357,6 +357,23 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     for radius in [&springs["radius"], &capsule["radius"], &extended["sphere"]["radius"]] {
         assert!((number(radius) / 0.1 - 1.2_f32.cbrt()).abs() < 1e-3, "{radius}");
     }
+    // A collider outside the cage, at a joint inside, moves with the surroundings of the joint: under a shift, its offset
+    // stays.
+    let extra = model.extra_points().unwrap();
+    let n = model.positions.len() + extra.len();
+    let at_offset = vec3(0.0, 1.0, 0.0) + 2.0 * offset;
+    let is_collider = |k: usize| {
+        let near = |p: &Vec3| p.distance(at_offset) < 0.1;
+        k.checked_sub(model.positions.len()).is_some_and(|k| near(&extra[k]))
+    };
+    let (outside, inside): (Vec<u32>, Vec<u32>) = (0..n as u32).partition(|&k| is_collider(k as usize));
+    assert!(!outside.is_empty() && !inside.is_empty());
+    let shift: Vec<DVec3> = (0..n).map(|k| if is_collider(k) { DVec3::ZERO } else { DVec3::X }).collect();
+    let (bytes, _) = model.write_reshaped(&shift, &outside, &[], &ReshapeOptions::default()).unwrap();
+    let springs = &json_of(&bytes)["extensions"]["VRM"]["secondaryAnimation"];
+    let collider = &springs["colliderGroups"][0]["colliders"][0];
+    assert!(object(&collider["offset"]).distance(offset) < ROUNDING_TOLERANCE, "{collider}");
+    assert!((number(&collider["radius"]) - 0.1).abs() < 1e-6, "{collider}");
     // Offsets from a joint outside the cage stay unchanged.
     let joints = model.joints().unwrap();
     let outside = (model.positions.len() + joints[2].point) as u32;

@@ -1,7 +1,7 @@
 //! Unskinned nodes: wheels, robots of rigid parts, VRM bones that carry meshes.
 
 use cagework_io::{Joints, Model, ReshapeOptions};
-use glam::{DVec3, Vec3, vec3};
+use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::{Value, json};
 
 use super::{ROUNDING_TOLERANCE, assert_near, by, f, player, read, reshaped, shown};
@@ -255,6 +255,86 @@ fn travel_of_a_root_that_stays_scales_with_the_skeleton() {
         let (before, after) = (travel(&model), travel(&read(&bytes)));
         assert!(before.z > 0.4 && after.distance(1.35 * before) < ROUNDING_TOLERANCE, "{before} {after}");
     }
+}
+
+/// A turn about the vertical axis takes each frame of a clip to the turned frame: the travel turns with the figure. The
+/// travel is at the hips, or at a root outside the cage that carries no vertices. If the figure is tilted, the travel stays
+/// on the ground.
+#[test]
+fn travel_of_turned_joints_turns_with_the_figure() {
+    let (turn, tilt) = (Quat::from_rotation_y(1.1), Quat::from_rotation_x(0.4));
+    for (travels, turn) in [(0, turn), (1, turn), (0, tilt), (1, tilt)] {
+        let turned = |p: Vec3| turn * p;
+        let mut robot = robot();
+        robot.json["animations"] = json!([]);
+        let rest = translation(&robot.json, 1) * travels as f32;
+        let keys = [rest, rest + vec3(0.3, 0.0, 1.0)].map(|key| key.to_array());
+        // The rotation tracks make hips and foot animated nodes, so that the root carries no vertices itself.
+        let still = || [0.0, 0.0, 0.0, 1.0].repeat(2);
+        let travel = keys.as_flattened().to_vec();
+        clip(
+            &mut robot,
+            &[(travels, "translation", travel), (1, "rotation", still()), (3, "rotation", still())],
+        );
+        let model = read(&robot.glb());
+        let (joints, extra) = (model.joints().unwrap(), model.extra_points().unwrap());
+        let root = joints.iter().find(|joint| joint.node == 0).map(|root| model.positions.len() + root.point);
+        let points = model.positions.iter().chain(&extra).enumerate();
+        // The seven points of a root outside the cage stay.
+        let by: Vec<DVec3> = points
+            .map(|(k, &p)| {
+                let stays = root.is_some_and(|root| (root..root + 7).contains(&k));
+                if stays { DVec3::ZERO } else { turned(p).as_dvec3() - p.as_dvec3() }
+            })
+            .collect();
+        let outside: Vec<u32> = root.into_iter().flat_map(|root| root..root + 7).map(|k| k as u32).collect();
+        let options = ReshapeOptions { joints: Joints::Turn, ..ReshapeOptions::default() };
+        let bytes = model.write_reshaped(&by, &outside, &[], &options).unwrap().0;
+        let after = model.player_of(&bytes).unwrap();
+        if turn == tilt {
+            let at = |seconds| after.at(Some(0), seconds, &[]).origins[1];
+            let (travel, way) = (at(1.0) - at(0.0), vec3(0.3, 0.0, 1.0));
+            assert!(travel.normalize().distance(way.normalize()) < 1e-5, "tilted, node {travels}: {travel}");
+            continue;
+        }
+        for seconds in [0.0, 1.0] {
+            let before = shown(&player(&model), Some(0), seconds, &[]);
+            let expected: Vec<Vec3> = before.iter().map(|&p| turned(p)).collect();
+            let found = shown(&after, Some(0), seconds, &[]);
+            assert_near(&found, &expected, 1e-5, &format!("travel of node {travels} at {seconds} s"));
+        }
+    }
+}
+
+/// An animated node without a mesh is in the gap between its two boxes, outside the cage. It moves with the boxes.
+#[test]
+fn pivots_outside_the_cage_move_with_what_they_carry() {
+    let mut b = Builder::new();
+    let mesh = centred_cube(&mut b);
+    b.json["nodes"] = json!([
+        { "name": "spinner", "children": [1, 2] },
+        { "mesh": mesh, "translation": [-2.0, 0.0, 0.0] },
+        { "mesh": mesh, "translation": [2.0, 0.0, 0.0] },
+    ]);
+    b.json["scenes"] = json!([{ "nodes": [0] }]);
+    clip(&mut b, &[(0, "rotation", vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8])]);
+    let model = read(&b.glb());
+    let spinner = model.joints().unwrap().into_iter().find(|joint| joint.node == 0).unwrap();
+    let pivot = model.positions.len() + spinner.point;
+    let n = model.positions.len() + model.extra_points().unwrap().len();
+    let by: Vec<DVec3> =
+        (0..n).map(|k| if (pivot..pivot + 7).contains(&k) { DVec3::ZERO } else { DVec3::Z }).collect();
+    let outside: Vec<u32> = (pivot..pivot + 7).map(|k| k as u32).collect();
+    let (bytes, report) = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default()).unwrap();
+    assert_eq!(report.joints_outside, 0);
+    let before = shown(&player(&model), Some(0), 1.0, &[]);
+    let expected: Vec<Vec3> = before.iter().map(|&p| p + Vec3::Z).collect();
+    assert_near(&shown(&model.player_of(&bytes).unwrap(), Some(0), 1.0, &[]), &expected, 1e-5, "at 1 s");
+    // With its boxes outside the cage, too, it stays, and the notice has its name.
+    let outside: Vec<u32> = (0..n as u32).collect();
+    let (_, report) = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default()).unwrap();
+    let notices = report.notices().join("\n");
+    assert!(notices.contains("outside the cage (spinner, "), "{notices}");
 }
 
 /// A uniform scale s takes each place of each clip to s times that place.
