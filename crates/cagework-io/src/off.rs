@@ -71,7 +71,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let Some(line) = header else { return Err(PolygonsError::Empty) };
     let mut words = tokens(bytes, line.range.clone());
     if words.clone().next().is_some_and(|word| bytes[word].eq_ignore_ascii_case(b"BINARY")) {
-        return Err(fault(line.number, "it is a binary OFF file: save it as text"));
+        return Err(PolygonsError::Unsupported("it is a binary OFF file: save it as text".into()));
     }
     let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.by_ref())?;
     let is_one_line = rows.peek().is_none();

@@ -1,5 +1,5 @@
-//! Rewrites PLY files for the parser `ply-rs-bw`, which rejects non-ASCII comments, CR line ends, empty lines, property
-//! names with special characters, unknown header lines and, in text files, numbers such as `.5`, `1.` and `nan`.
+//! Rewrites PLY files for the parser `ply-rs-bw`, which rejects non-ASCII comments, CR line ends, empty lines, indented
+//! lines, property names with special characters, unknown header lines and, in text files, numbers such as `.5`, `1.` and `nan`.
 
 use std::borrow::Cow;
 
@@ -123,7 +123,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
             // Append the line number, so that names whose special characters were replaced stay distinct.
             out.extend(format!("-{number}").into_bytes());
         } else {
-            out.extend(line.iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
+            out.extend(line.trim_ascii_start().iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
         }
         out.push(b'\n');
     }
@@ -133,8 +133,11 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
 /// Finds the offset of the first byte after the header; `None` if the header has no end.
 fn end_of_header(bytes: &[u8], line_end: u8) -> Option<usize> {
     const END: &[u8] = b"end_header";
-    let is_end = |word: &[u8]| word[0] == line_end && word[1..] == *END;
-    let at = bytes.windows(END.len() + 1).position(is_end)? + END.len() + 1;
+    let is_end = |&at: &usize| {
+        let mut before = bytes[..at].iter().rev();
+        bytes[at..].starts_with(END) && before.find(|b| !b" \t".contains(b)) == Some(&line_end)
+    };
+    let at = (0..bytes.len()).find(is_end)? + END.len();
     Some(at + bytes[at..].iter().position(|&b| b == line_end)? + 1)
 }
 

@@ -20,6 +20,9 @@ pub enum PolygonsError {
     /// The file does not follow the syntax of its format.
     #[error("the file is damaged: {0}")]
     Syntax(String),
+    /// The file has content that is not read.
+    #[error("{0}")]
+    Unsupported(String),
     /// A count is too large for the size of the file.
     #[error(
         "its header declares {count} '{name}' elements, too many for a file of {bytes} bytes: it is damaged or cut off"

@@ -34,6 +34,8 @@ pub(crate) struct GltfContents {
     pub(crate) json: Value,
     /// JSON chunk as read, if the file is a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
+    /// The file, if it is a GLB with all buffers in `data:` URIs or in its binary chunk.
+    pub(crate) packed: Option<Vec<u8>>,
     /// Whether compressed geometry was decoded.
     pub(crate) is_decoded: bool,
     pub(crate) root: Root,
@@ -64,8 +66,12 @@ pub(crate) fn load(
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
     let (fallbacks, all) = (fallbacks(&json), (0..).zip(json["buffers"].as_array().into_iter().flatten()));
-    let mut used = all.filter(|(number, _)| !fallbacks.contains(number));
-    let text = text.filter(|_| used.all(|(_, buffer)| buffer.get("uri").is_none()));
+    let uris =
+        all.filter(|(number, _)| !fallbacks.contains(number)).filter_map(|(_, buffer)| buffer.get("uri"));
+    let uris: Vec<&Value> = uris.collect();
+    let text = text.filter(|_| uris.is_empty());
+    let is_inline = !uris.is_empty() && uris.iter().all(|uri| uri.as_str().is_some_and(is_data));
+    let packed = (is_inline && bytes.starts_with(b"glTF")).then(|| bytes.to_vec());
     let mut siblings = Siblings::new(resolve, memory_limit);
     let buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
     let n_in_file = buffers.len();
@@ -85,9 +91,10 @@ pub(crate) fn load(
     let mut seen = HashSet::new();
     let loaded = buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes));
     let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
-    let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
+    let of_packed = packed.as_ref().map_or(0, Vec::len) as u64;
+    let held = of_json + bytes.len() as u64 + of_packed + loaded.sum::<u64>();
     MemoryError::check(held, memory_limit)?;
-    Ok(GltfContents { json, text, is_decoded, root, buffers, images, bytes: held })
+    Ok(GltfContents { json, text, packed, is_decoded, root, buffers, images, bytes: held })
 }
 
 /// Names of external buffers and images; empty if the file cannot be read.

@@ -9,8 +9,11 @@ use ::gltf::json::{Index, Root};
 use draco_core::{
     DataType, DecodeLimits, DecoderBuffer, ErrorKind, Mesh, MeshDecoder, PointAttribute, PointIndex,
 };
-use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
+use meshoptimizer_rs::codec::{
+    BufferView, Filter, Mode, decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat,
+    decode_vertex_buffer,
+};
+use meshoptimizer_rs::{Error, Workspace};
 use serde_json::{Map, Value, json};
 
 use super::accessor::{MAX_ELEMENTS, Source};
@@ -204,11 +207,25 @@ fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, Stri
     if (number("count") as u64).saturating_mul(number("byteStride") as u64) > left {
         return Err(format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20));
     }
-    let decode = || {
+    let (count, stride, work) = (number("count"), number("byteStride"), &mut Workspace::default());
+    let filter = packed["filter"].as_str().unwrap_or("NONE");
+    let mut decode = || {
         let mode = Mode::parse(packed["mode"].as_str().unwrap_or_default())?;
-        let filter = Filter::parse(packed["filter"].as_str().unwrap_or("NONE"))?;
-        BufferView::new(mode, filter, number("count"), number("byteStride"))?
-            .decode(source, &mut Workspace::default())
+        if mode != Mode::Attributes {
+            return BufferView::new(mode, Filter::parse(filter)?, count, stride)?.decode(source, work);
+        }
+        // `BufferView` lacks version 1 of the vertex codec and the filter COLOR of KHR_meshopt_compression.
+        let mut bytes = decode_vertex_buffer(count, stride, source, work)?;
+        match filter {
+            "COLOR" => decode_filter_color(&mut bytes, count, stride, work)?,
+            _ => match Filter::parse(filter)? {
+                Filter::None => {}
+                Filter::Octahedral => decode_filter_oct(&mut bytes, count, stride, work)?,
+                Filter::Quaternion => decode_filter_quat(&mut bytes, count, stride, work)?,
+                Filter::Exponential => decode_filter_exp(&mut bytes, count, stride, work)?,
+            },
+        }
+        Ok::<_, Error>(bytes)
     };
     decode().map_err(|_| "its stream is damaged or has an unknown mode".to_owned())
 }

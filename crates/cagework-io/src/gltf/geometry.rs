@@ -247,6 +247,12 @@ fn add_morphs(
     Ok(())
 }
 
+/// Whether the default scene shows points.
+pub(super) fn has_points(document: &GltfDocument) -> bool {
+    let meshes = document.instances.iter().map(|instance| &document.root.meshes[instance.mesh as usize]);
+    meshes.flat_map(|mesh| &mesh.primitives).any(|p| matches!(p.mode, Checked::Valid(Mode::Points)))
+}
+
 /// Triangles of a primitive, with indices of the primitive's own vertices; empty for points and lines.
 pub(super) fn triangles_of(
     document: &GltfDocument,

@@ -193,6 +193,9 @@ pub enum GltfError {
     /// The default scene shows no triangles.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
+    /// The default scene shows points, but no triangles.
+    #[error("it has points, but no triangles: a PLY of the same points works")]
+    OnlyPoints,
     /// The default scene shows no triangles, but the file contains clips.
     #[error(
         "it has clips, but no triangles: open the model that they move, then fit them to its skeleton (command: \
@@ -227,7 +230,8 @@ pub(crate) struct GltfDocument {
     pub(crate) images: Vec<Option<Image>>,
     /// JSON chunk as read, if the file is a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
-    /// The compressed file that the caller decoded to get this document, if that file is a self-contained GLB.
+    /// The file, if it is a self-contained GLB that `text` and the first buffer cannot rebuild: the caller decoded its
+    /// compressed geometry, or a buffer is a `data:` URI.
     pub(crate) packed: Option<Vec<u8>>,
     /// Whether compressed geometry was decoded. The decoded values are in buffers after those of the file.
     pub(crate) is_decoded: bool,
@@ -372,6 +376,7 @@ pub(crate) fn read(
         match (has_clips, clips_alone) {
             (true, true) => {}
             (true, false) => return Err(GltfError::OnlyClips),
+            (false, _) if geometry::has_points(&document) => return Err(GltfError::OnlyPoints),
             (false, _) => return Err(GltfError::NoTriangles),
         }
     }
@@ -413,7 +418,7 @@ fn parse(
         buffers: loaded.buffers,
         images: loaded.images,
         text: loaded.text,
-        packed: None,
+        packed: loaded.packed,
         is_decoded: loaded.is_decoded,
         instances,
         elsewhere,

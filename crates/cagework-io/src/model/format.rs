@@ -209,7 +209,7 @@ formats! {
         endings: &["3mf"],
         mime_types: &["model/3mf"],
         is: threemf::is_3mf,
-        marked: &[["3mf", "not a 3MF", "it is not a zip archive with a part '.model'"]],
+        marked: &[["3mf", "not a 3MF", "it is not a zip archive with a model part"]],
         read: |source| source.polygons(ModelFormat::ThreeMf, threemf::read),
         write: |model, positions| {
             let shape = model.shape(positions)?;

@@ -95,10 +95,10 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     let mut header = [0; HEADER];
     let cut_off = |_| SplatError::Damaged("its gzip stream is damaged or cut off".into());
     if is_zstd {
-        let whole = bytes.first_chunk::<HEADER_4>().ok_or_else(|| {
+        let first = bytes.first_chunk::<HEADER>().filter(|first| bytes.len() >= HEADER_4 || first[4] < 4);
+        header = *first.ok_or_else(|| {
             SplatError::Damaged(format!("its header has {} bytes, not {HEADER_4}", bytes.len()))
         })?;
-        header.copy_from_slice(&whole[..HEADER]);
     } else {
         decoder.read_exact(&mut header).map_err(cut_off)?;
     }
@@ -107,6 +107,11 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     }
     let [version, count] = [4, 8].map(|at| word(&header, at));
     let layout = Layout { version, count: count as usize, degree: header[12], fraction: header[13] };
+    if is_zstd && (1..4).contains(&version) {
+        return Err(SplatError::Unsupported(format!(
+            "it is an SPZ of version {version} without its gzip stream: compress it with `gzip`, then rename it to .spz"
+        )));
+    }
     if !(1..=4).contains(&version) {
         return Err(SplatError::Unsupported(format!(
             "it is an SPZ of version {version}, but versions 1 to 4 are read: convert it with `splat-transform IN.spz OUT.ply`"

@@ -27,12 +27,21 @@ const USUAL_PART: &str = "3D/3dmodel.model";
 /// contains.
 const DIRECTORY_BYTES: usize = 1 << 20;
 
-/// Whether the content is a zip archive with a model part.
+/// Limit on the memory for the relationships in [`is_3mf`], bytes.
+const MAX_RELATIONSHIPS: u64 = 1 << 20;
+/// First bytes of an encrypted part (Secure Content Extension, appendix D).
+const ENCRYPTED: &[u8] = b"%3McF";
+
+/// Whether the content is a zip archive with a model part, which has the extension `.model` or is named by the
+/// relationships.
 pub(crate) fn is_3mf(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"PK\x03\x04")
-        && bytes[bytes.len().saturating_sub(DIRECTORY_BYTES)..]
-            .windows(6)
-            .any(|name| name.eq_ignore_ascii_case(b".model"))
+    let directory = &bytes[bytes.len().saturating_sub(DIRECTORY_BYTES)..];
+    let names = |name: &[u8]| directory.windows(name.len()).any(|at| at.eq_ignore_ascii_case(name));
+    let is_related = || {
+        let package = Package::open(bytes, MAX_RELATIONSHIPS);
+        package.and_then(|mut package| package.model_parts()).is_ok_and(|parts| !parts.is_empty())
+    };
+    bytes.starts_with(b"PK\x03\x04") && (names(b".model") || names(RELATIONSHIPS.as_bytes()) && is_related())
 }
 
 /// A file of the archive.
@@ -73,6 +82,14 @@ pub(super) fn part_name(name: &[u8]) -> Vec<u8> {
 pub(super) fn fault(name: &str, problem: &str) -> PolygonsError {
     let space = if problem.starts_with(':') { "" } else { " " };
     PolygonsError::Syntax(format!("its part '{}'{space}{problem}", shown_start(name, MAX_NAME_CHARS)))
+}
+
+/// Creates the error for an encrypted part.
+fn encrypted(name: &str) -> PolygonsError {
+    let name = shown_start(name, MAX_NAME_CHARS);
+    PolygonsError::Unsupported(format!(
+        "its part '{name}' is encrypted: save the model without protection in the program that wrote it"
+    ))
 }
 
 /// Lists all files of an archive; also returns its comment.
@@ -120,7 +137,22 @@ impl<'a> Package<'a> {
 
     /// Finds the name of the first model part.
     pub(super) fn first_part(&mut self) -> Result<String, PolygonsError> {
-        let Some(index) = self.index(RELATIONSHIPS) else { return Ok(USUAL_PART.into()) };
+        match self.model_parts()?.as_slice() {
+            [] => Ok(USUAL_PART.into()),
+            [first] => Ok(first.clone()),
+            [first, second, ..] => {
+                let [first, second] = [first, second].map(|name| shown_start(name, MAX_NAME_CHARS));
+                Err(PolygonsError::Unsupported(format!(
+                    "its relationships name two first model parts, '{first}' and '{second}': save the model again with one"
+                )))
+            }
+        }
+    }
+
+    /// Names of the model parts in the relationships, without repetitions.
+    fn model_parts(&mut self) -> Result<Vec<String>, PolygonsError> {
+        let mut parts: Vec<String> = Vec::new();
+        let Some(index) = self.index(RELATIONSHIPS) else { return Ok(parts) };
         let text = self.text(RELATIONSHIPS, index)?;
         let mut reader = Reader::from_str(&text);
         loop {
@@ -134,11 +166,12 @@ impl<'a> Package<'a> {
                             _ => {}
                         }
                     }
-                    if is_model {
-                        return Ok(target);
+                    let same = |part: &String| part_name(part.as_bytes()) == part_name(target.as_bytes());
+                    if is_model && !parts.iter().any(same) {
+                        parts.push(target);
                     }
                 }
-                Event::Eof => return Ok(USUAL_PART.into()),
+                Event::Eof => return Ok(parts),
                 _ => {}
             }
         }
@@ -159,10 +192,14 @@ impl<'a> Package<'a> {
         let unpacked = match entry.method {
             CompressionMethod::STORE if !entry.is_encrypted => unpack(&mut &*entry.data),
             CompressionMethod::DEFLATE if !entry.is_encrypted => unpack(&mut DeflateDecoder::new(entry.data)),
-            _ => return Err(fault(name, "is encrypted, or compressed by a method other than deflate")),
+            _ if entry.is_encrypted => return Err(encrypted(name)),
+            _ => return Err(fault(name, "is compressed by a method other than deflate")),
         };
         if unpacked.is_err() || bytes.len() as u64 != size || crc32(&bytes) != entry.crc {
             return Err(fault(name, "cannot be unpacked"));
+        }
+        if bytes.starts_with(ENCRYPTED) {
+            return Err(encrypted(name));
         }
         String::from_utf8(bytes).map_err(|_| fault(name, "is not UTF-8 text"))
     }

@@ -62,6 +62,18 @@ pub(super) struct Placement {
     pub(super) id_span: Range<usize>,
 }
 
+/// Parts of the namespaces of extensions that a file may require. Their data are read, or kept but not shown.
+const EXTENSIONS: [&str; 8] = [
+    "/core/",
+    "/production/",
+    "/material/",
+    "/beamlattice/",
+    "/slice/",
+    "/trianglesets/",
+    "/volumetric/",
+    "/displacement/",
+];
+
 /// Limit on the colours of all groups.
 const MAX_COLORS: u64 = 1 << 18;
 
@@ -137,6 +149,9 @@ impl ModelPart {
                         let root = shown_start(tag_name.as_ref(), MAX_NAME_CHARS);
                         return Err(fault(name, &format!("is not a model: its root is '{root}'")));
                     }
+                    if tag_name.as_ref() == "model" {
+                        check_extensions(name, &tag)?;
+                    }
                     counts.add(tag_name.as_ref())?;
                     read.start(&tag).map_err(|problem| fault(name, &problem))?;
                     if is_empty {
@@ -156,6 +171,21 @@ impl ModelPart {
             }
         }
     }
+}
+
+/// Checks that all extensions that the root of the part `name` requires are known.
+fn check_extensions(name: &str, tag: &BytesStart<'_>) -> Result<(), PolygonsError> {
+    let of = |name: &str| attributes(tag).find(|(key, _)| *key == name).map(|(_, value)| value);
+    for prefix in of("requiredextensions").unwrap_or_default().split_ascii_whitespace() {
+        let space = of(&format!("xmlns:{prefix}")).unwrap_or(prefix);
+        if !EXTENSIONS.iter().any(|known| space.contains(known)) {
+            let [name, space] = [name, space].map(|text| shown_start(text, MAX_NAME_CHARS));
+            return Err(PolygonsError::Unsupported(format!(
+                "its part '{name}' requires the extension '{space}', which is not read: save the model again without it"
+            )));
+        }
+    }
+    Ok(())
 }
 
 impl PartReader<'_> {

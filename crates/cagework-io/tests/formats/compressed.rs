@@ -8,7 +8,9 @@ use draco_core::{
 };
 use glam::{DVec3, Vec3};
 use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer};
+use meshoptimizer_rs::codec::{
+    IndexEncoding, VertexEncoding, encode_filter_color, encode_index_buffer, encode_vertex_buffer,
+};
 use serde_json::json;
 
 use crate::common::{self, Builder, CUBE, CUBE_TRIANGLES, json_of, plain_cube, read, volume};
@@ -60,10 +62,10 @@ fn draco(stream: &[u8]) -> Builder {
 }
 
 /// The cube as two meshopt streams. Its buffer views refer to a second buffer without bytes.
-fn meshopt(extension: &str) -> Builder {
+fn meshopt(extension: &str, version: u8) -> Builder {
     let mut b = plain_cube();
     let workspace = &mut Workspace::default();
-    let encoding = VertexEncoding::new(0, 0).unwrap();
+    let encoding = VertexEncoding::new(version, 0).unwrap();
     let vertices = encode_vertex_buffer(&floats(), CUBE.len(), 12, encoding, workspace).unwrap();
     let corners: Vec<u32> = CUBE_TRIANGLES.as_flattened().to_vec();
     let indices = encode_index_buffer(&corners, IndexEncoding::DEFAULT, workspace).unwrap();
@@ -86,6 +88,50 @@ fn meshopt(extension: &str) -> Builder {
     }
     b.json["extensionsUsed"] = json!([extension]);
     b
+}
+
+/// The vertex codec of version 1, and the filter COLOR, which stores luma, chroma and opacity.
+#[test]
+fn version_1_of_the_vertex_codec_and_the_filter_of_colours_are_read() {
+    const KHR: &str = "KHR_meshopt_compression";
+    let workspace = &mut Workspace::default();
+    let colors: [[f32; 4]; 8] = std::array::from_fn(|v| {
+        [0.0, 1.0, 2.0, 3.0]
+            .map(|c| if c == 3.0 { 1.0 } else { ((v as f32 * 3.0 + c) / 24.0 * 255.0).round() / 255.0 })
+    });
+    for (version, filter) in [(0, None), (1, None), (0, Some("COLOR")), (1, Some("COLOR"))] {
+        let mut b = meshopt(KHR, version);
+        if filter.is_some() {
+            let filtered = encode_filter_color(CUBE.len(), 4, 8, colors.as_flattened(), workspace).unwrap();
+            let encoding = VertexEncoding::new(version, 0).unwrap();
+            let stream = encode_vertex_buffer(&filtered, CUBE.len(), 4, encoding, workspace).unwrap();
+            let packed = b.view(&stream);
+            let mut packed = b.json["bufferViews"][packed].clone();
+            (packed["mode"], packed["count"], packed["byteStride"]) =
+                ("ATTRIBUTES".into(), CUBE.len().into(), 4.into());
+            packed["filter"] = json!(filter);
+            let view = b.push(
+                "bufferViews",
+                json!({ "buffer": 1, "byteLength": 32, "byteStride": 4, "extensions": { KHR: packed } }),
+            );
+            let accessor = b.push(
+                "accessors",
+                json!({ "bufferView": view, "componentType": 5121, "normalized": true, "count": 8, "type": "VEC4" }),
+            );
+            b.primitive(0)["attributes"]["COLOR_0"] = accessor.into();
+        }
+        let model = read("x.glb", &with_fallback(&b)).unwrap();
+        assert_eq!(model.positions, CUBE.map(Vec3::from), "version {version}, {filter:?}");
+        assert_eq!(model.triangles.len(), CUBE_TRIANGLES.len());
+        if filter.is_some() {
+            let found = model.look().vertices;
+            for (vertex, expected) in found.iter().zip(colors) {
+                // Luma and two chroma values are rounded to bytes.
+                let off = (0..4).map(|c| (expected[c] - vertex.color[c]).abs());
+                assert!(off.fold(0.0, f32::max) < 0.02, "{:?} instead of {expected:?}", vertex.color);
+            }
+        }
+    }
 }
 
 /// A GLB with a missing fallback buffer for programs without a decoder.
@@ -201,7 +247,7 @@ fn bounds_and_weights_match_the_decoded_values() {
 #[test]
 fn meshopt_is_decoded_by_both_names_without_its_fallback() {
     for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
-        let bytes = with_fallback(&meshopt(extension));
+        let bytes = with_fallback(&meshopt(extension, 0));
         let model = read("x.glb", &bytes).unwrap();
         let plain = read("x.glb", &plain_cube().glb()).unwrap();
         assert_eq!(model.positions, plain.positions);
@@ -228,7 +274,7 @@ fn damaged_streams_are_errors() {
             let _ = read("x.glb", &draco(&wrong).glb());
         }
     }
-    let mut b = meshopt("EXT_meshopt_compression");
+    let mut b = meshopt("EXT_meshopt_compression", 0);
     for view in b.json["bufferViews"].as_array_mut().unwrap() {
         if view.get("extensions").is_some() {
             view["extensions"]["EXT_meshopt_compression"]["count"] = json!(u64::MAX);

@@ -45,6 +45,20 @@ fn export_at_rest_is_the_original_shape() {
 }
 
 #[test]
+fn unmoved_glb_with_its_buffer_in_a_data_uri_is_written_as_read() {
+    let mut json = plain_cube().json;
+    let bin = plain_cube().bin;
+    let hex: String = bin.iter().map(|byte| format!("%{byte:02x}")).collect();
+    json["buffers"] = json!([{ "byteLength": bin.len(), "uri": format!("data:,{hex}") }]);
+    let file = common::glb(&json, None);
+    let model = read("x.glb", &file).unwrap();
+    assert!(model.write_glb(&model.positions).unwrap() == file);
+    let moved = deformed(&model);
+    let again = read("y.glb", &model.write_glb(&moved).unwrap()).unwrap();
+    assert!(relative_error(&moved, &again.positions) < ROUND_TRIP);
+}
+
+#[test]
 fn materials_textures_names_and_nodes_survive() {
     let model = square();
     let (before, after) = (textured_square().json, json_of(&model.write_glb(&deformed(&model)).unwrap()));

@@ -375,3 +375,16 @@ fn json_of_too_many_values_is_refused_before_it_is_read() {
     // One separator for each item of the array, and seven others.
     assert!(found.contains("values in the JSON: 4194311, more than the limit of 4194304"), "{found}");
 }
+
+#[test]
+fn point_clouds_are_refused_with_a_format_that_works() {
+    let mut b = plain_cube();
+    b.primitive(0)["mode"] = json!(0);
+    let message = read("x.glb", &b.glb()).unwrap_err().to_string();
+    assert!(
+        message.ends_with("it has points, but no triangles: a PLY of the same points works"),
+        "{message}"
+    );
+    b.primitive(0)["mode"] = json!(1);
+    assert!(read("x.glb", &b.glb()).unwrap_err().to_string().contains("it has no triangles"));
+}

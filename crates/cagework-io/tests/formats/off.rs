@@ -97,7 +97,7 @@ fn damaged_off_files_are_errors() {
         ("4 0 2 3 1", "5 0 2 3 1", "line 11: has 4 corners of 5"),
         ("OFF\n8 6 12\n", "OFF\n8\n", "damaged: line 2: has only 1 of 2 numbers"),
         ("OFF\n", "4OFF\n", "only three-dimensional vertices are supported"),
-        ("OFF\n", "OFF BINARY\n", "it is a binary OFF file: save it as text"),
+        ("OFF\n", "OFF BINARY\n", "x.off: it is a binary OFF file: save it as text"),
     ] {
         let text = good.replacen(from, to, 1);
         assert!(text != good, "{from}");

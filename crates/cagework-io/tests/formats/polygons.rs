@@ -32,6 +32,22 @@ fn ply_text() -> String {
 }
 
 #[test]
+fn indented_lines_of_a_ply_header_are_read() {
+    let [plain, indented] =
+        [ply_text(), ply_text().replace("\nelement", "\n  element").replace("\nend", "\n\tend")]
+            .map(|text| read("cube.ply", text.as_bytes()).unwrap());
+    assert_eq!((&plain.positions, plain.cage_mesh()), (&indented.positions, indented.cage_mesh()));
+    let binary = String::from_utf8_lossy(
+        b"ply\nformat binary_little_endian 1.0\n element vertex 2\n property float x\n \
+        property float y\n property float z\n end_header\n",
+    )
+    .into_owned();
+    let body: Vec<u8> = [0.0_f32, 0.0, 0.0, 1.5, 2.5, 3.5].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let points = read("points.ply", &[binary.as_bytes(), &body].concat()).unwrap();
+    assert_eq!(points.positions, [Vec3::ZERO, Vec3::new(1.5, 2.5, 3.5)]);
+}
+
+#[test]
 fn ply_is_read_with_polygons_and_colours_and_lists_ignored_data() {
     let model = read("cube.ply", ply_text().as_bytes()).unwrap();
     assert_eq!((model.format(), model.n_faces(), model.triangles.len()), (ModelFormat::Ply, 6, 12));

@@ -542,6 +542,11 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         "{unpacked}"
     );
 
+    let bare = fault("a.spz", &body);
+    assert!(
+        bare.contains("it is an SPZ of version 3 without its gzip stream: compress it with `gzip`"),
+        "{bare}"
+    );
     let good = spz_4_of_one(&[0; 9], &[0; 4], &[]);
     let changed = |at: usize, to: &[u8]| {
         let mut file = good.clone();

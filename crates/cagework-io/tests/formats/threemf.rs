@@ -259,12 +259,60 @@ fn damaged_files_are_errors_that_name_the_fault() {
     );
     assert_eq!(
         fault(b"solid a"),
-        "a.3mf is not a 3MF: it is not a zip archive with a part '.model': it is damaged or has the wrong name"
+        "a.3mf is not a 3MF: it is not a zip archive with a model part: it is damaged or has the wrong name"
     );
     let file = plate();
     for n in 4..file.len() {
         assert!(read("a.3mf", &file[..n]).is_err(), "{n}");
     }
+}
+
+/// A 3MF with the cube in `part`; its relationships name `targets`.
+fn related(part: &str, text: &[u8], targets: &[&str]) -> Vec<u8> {
+    const MODEL: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
+    let related: Vec<String> = targets
+        .iter()
+        .map(|t| format!("<Relationship Id=\"a\" Target=\"/{t}\" Type=\"{MODEL}\"/>"))
+        .collect();
+    let relationships = format!("<Relationships>{}</Relationships>", related.concat());
+    let files = [("_rels/.rels", relationships.as_bytes()), (part, text)];
+    let files: Vec<_> = files.map(|(name, bytes)| (name.to_owned(), bytes.to_vec())).into();
+    cagework_io::write_zip(&files).unwrap()
+}
+
+#[test]
+fn model_part_is_the_one_that_the_relationships_name() {
+    let text = model_part(
+        &format!("<object id=\"1\" type=\"model\">{}</object>", cube_mesh()),
+        "<item objectid=\"1\"/>",
+    );
+    let file = |targets: &[&str]| related("3D/cube.custom", text.as_bytes(), targets);
+    for targets in [&["3D/cube.custom"][..], &["3D/cube.custom", "3d/CUBE.custom"]] {
+        assert_eq!(read("a.3mf", &file(targets)).unwrap().positions, cube());
+    }
+    let two = fault(&file(&["3D/cube.custom", "3D/b.model"]));
+    assert!(
+        two.ends_with(
+            "name two first model parts, '/3D/cube.custom' and '/3D/b.model': save the model again with one"
+        ),
+        "{two}"
+    );
+    assert!(fault(&file(&[])).contains("is not a 3MF"));
+    let secret = fault(&related(ROOT, b"%3McF\0\0\0", &[ROOT]));
+    let end = "its part '/3D/3dmodel.model' is encrypted: save the model without protection in the program that wrote it";
+    assert!(secret.ends_with(end), "{secret}");
+    let requires = |prefix: &str, space: &str| {
+        let root = format!(
+            "<model requiredextensions=\"p {prefix}\" xmlns:{prefix}=\"http://a.org/{space}/2015/07\" "
+        );
+        related(ROOT, text.replacen("<model ", &root, 1).as_bytes(), &[ROOT])
+    };
+    assert_eq!(read("a.3mf", &requires("m", "material")).unwrap().positions, cube());
+    let unknown = fault(&requires("q", "gadgets"));
+    assert!(
+        unknown.contains("requires the extension 'http://a.org/gadgets/2015/07', which is not read"),
+        "{unknown}"
+    );
 }
 
 /// Entities are not expanded: document types are refused, and other references to entities are text.
