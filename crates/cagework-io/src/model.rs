@@ -231,7 +231,7 @@ impl Model {
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
         /// Memory per vertex: deformation gradients and their sums, normals, new positions and the output.
-        const VERTEX_BYTES: u64 = 700;
+        const VERTEX_BYTES: u64 = 300;
         const TRIANGLE_BYTES: u64 = 60;
         let n = |count: usize| count as u64;
         let shape = VERTEX_BYTES * n(self.positions.len()) + TRIANGLE_BYTES * n(self.triangles.len());

@@ -23,6 +23,9 @@ const NORMAL_WEIGHTS: [f64; 2] = [1e-4, 1.0];
 /// such as hair or a cape.
 const MIN_FACING_COS: f64 = -0.5;
 
+/// Limit on groups of vertices compared per position. Without it, n vertices that leave one point cost O(n²).
+const MAX_GROUPS_AT_ONE_PLACE: usize = 64;
+
 /// Largest sum of areas that counts as zero, as a fraction of the sum of their lengths.
 const MAX_CANCELLED: f64 = 1e-6;
 
@@ -64,7 +67,7 @@ impl Surface {
             let is_same = |&&(first, _): &&(usize, u32)| {
                 to[first] == to[v] && normals[first].dot(normals[v]) >= MIN_FACING_COS
             };
-            let known = here.iter().find(is_same).map(|&(_, unique)| unique);
+            let known = here.iter().take(MAX_GROUPS_AT_ONE_PLACE).find(is_same).map(|&(_, unique)| unique);
             if known.is_none() {
                 here.push((v, n_unique));
                 n_unique += 1;
