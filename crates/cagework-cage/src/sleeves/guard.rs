@@ -13,8 +13,8 @@ use crate::generate::MIN_FOLD_COSINE;
 pub(super) enum Fault {
     /// Quads meet or are folded sharply.
     Quads(Faults),
-    /// Points of the model outside.
-    Outside(usize),
+    /// Indices of the points of the model that are outside.
+    Outside(Vec<usize>),
     /// The surface is not closed, or a face has no area.
     Invalid,
 }
@@ -90,12 +90,15 @@ pub(super) fn verify(positions: Vec<Vec3>, quads: &[[u32; 4]], points: &[Vec3]) 
         return Err(Fault::Invalid);
     }
     let halves = halves(&at, quads);
-    let mut outside = Enclosure::new(&cage, points).outside().len();
+    let mut outside: Vec<usize> =
+        Enclosure::new(&cage, points).outside().into_iter().map(|v| v as usize).collect();
     for cut in [0, 1] {
         let corners: Vec<[DVec3; 3]> = halves.iter().skip(cut).step_by(2).map(|t| t.at).collect();
         let columns = Columns::new(&corners);
-        let is_outside = |p: &&Vec3| columns.winding_number(p.as_dvec3()) <= MIN_INSIDE_WINDING;
-        outside = outside.max(points.iter().filter(is_outside).count());
+        let is_outside = |&i: &usize| columns.winding_number(points[i].as_dvec3()) <= MIN_INSIDE_WINDING;
+        outside.extend((0..points.len()).filter(is_outside));
     }
-    if outside > 0 { Err(Fault::Outside(outside)) } else { Ok(cage) }
+    outside.sort_unstable();
+    outside.dedup();
+    if outside.is_empty() { Ok(cage) } else { Err(Fault::Outside(outside)) }
 }

@@ -4,8 +4,11 @@ use glam::{DVec3, U64Vec3};
 
 use super::Model;
 
-/// Largest distance between neighbouring samples of a triangle.
-const SPACING: f64 = 0.02;
+/// Largest distance between neighbouring samples of a triangle that sleeves are fitted to.
+pub(super) const SPACING: f64 = 0.02;
+
+/// Largest distance between neighbouring samples of a triangle in the final check.
+pub(super) const FINE_SPACING: f64 = 0.01;
 
 /// Largest number of parts into which the edges of a triangle are divided for sampling.
 const MAX_PARTS: usize = 40;
@@ -38,27 +41,28 @@ pub(super) struct Sample {
 }
 
 /// Number of parts into which the edges of a triangle are divided.
-fn parts_of(corners: [DVec3; 3]) -> usize {
+fn parts_of(corners: [DVec3; 3], spacing: f64) -> usize {
     let longest = (0..3).map(|k| corners[k].distance(corners[(k + 1) % 3])).fold(0.0, f64::max);
-    ((longest / SPACING).ceil() as usize).min(MAX_PARTS)
+    ((longest / spacing).ceil() as usize).min(MAX_PARTS)
 }
 
 /// Number of samples of a model, at most three per triangle more than [`samples`] returns.
-pub(super) fn n_samples(model: &Model) -> usize {
-    let of = |triangle: &[u32; 3]| match parts_of(triangle.map(|v| model.at[v as usize])) {
+pub(super) fn n_samples(model: &Model, spacing: f64) -> usize {
+    let of = |triangle: &[u32; 3]| match parts_of(triangle.map(|v| model.at[v as usize]), spacing) {
         0 | 1 => 0,
         n => (n + 1) * (n + 2) / 2,
     };
     model.at.len() + model.triangles.iter().map(of).sum::<usize>()
 }
 
-/// Samples vertices and triangles. `limb_of`: limb of each vertex. `[n_vertices]`
-pub(super) fn samples(model: &Model, limb_of: &[u32], bone_of: &[u32]) -> Vec<Sample> {
+/// Samples vertices and triangles. `spacing`: largest distance between neighbouring samples of a triangle. `limb_of`: limb
+/// of each vertex. `[n_vertices]`
+pub(super) fn samples(model: &Model, spacing: f64, limb_of: &[u32], bone_of: &[u32]) -> Vec<Sample> {
     let of = |at: DVec3, vertex: usize| Sample { at, limb: limb_of[vertex], bone: bone_of[vertex] };
     let mut samples: Vec<Sample> = model.at.iter().enumerate().map(|(v, &p)| of(p, v)).collect();
     for triangle in &model.triangles {
         let corners = triangle.map(|v| model.at[v as usize]);
-        let n = parts_of(corners);
+        let n = parts_of(corners, spacing);
         for (i, j) in (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j))) {
             let parts = [i, j, n - i - j];
             let most = (0..3).max_by_key(|&k| (parts[k], 2 - k)).unwrap_or(0);
