@@ -28,7 +28,7 @@ use zip::result::ZipError;
 use crate::memory::MemoryError;
 use crate::shown::shown;
 use crate::up::UpAxis;
-use arrays::{Archive, NpyArray, NpzWriter, array, npy_header, required};
+use arrays::{Archive, Budget, NpyArray, NpzWriter, array, npy_header, required};
 
 /// Error of reading a weights file.
 #[derive(Debug, Error)]
@@ -201,8 +201,8 @@ pub fn write_field_npz(field: &Field, origin: DVec3, up: UpAxis) -> Vec<u8> {
 /// # Errors
 /// [`NpzError`] if the file is not an array of this shape.
 pub(crate) fn npy_points(mut bytes: &[u8]) -> Result<(Vec<DVec3>, bool), NpzError> {
-    let mut unpacked = 0;
-    NpyArray::read("points", &mut bytes, (&mut unpacked, u64::MAX))?.wide_points()
+    let mut budget = Budget::new(bytes.len() as u64, u64::MAX);
+    NpyArray::read("points", &mut bytes, &mut budget)?.wide_points()
 }
 
 /// Writes points as an `.npy` file, `[n, 3]`.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use ::gltf::json::Root;
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::validation::Checked;
+use cagework_core::words::counted;
 
 use super::{GltfError, get};
 
@@ -229,6 +230,15 @@ impl<'a> Source<'a> {
         let v = get(&self.root.buffer_views, view, "buffer view", from)?;
         let buffer = get(self.buffers, v.buffer.value(), "buffer", || format!("buffer view {view}"))?;
         let stride = v.byte_stride.map(|s| s.0).filter(|&s| s > 0).unwrap_or(size);
+        if stride < size && count > 1 {
+            return Err(fault(
+                accessor,
+                format!(
+                    "has elements of {size} bytes every {}, so they overlap: export it again",
+                    counted(stride, "byte", "bytes")
+                ),
+            ));
+        }
         let view_start = v.byte_offset.map_or(0, |o| o.0);
         let view_end = view_start.checked_add(v.byte_length.0).filter(|&end| end <= buffer.len() as u64);
         let Some(view_end) = view_end else {

@@ -78,23 +78,27 @@ pub(crate) fn load(
     #[cfg(feature = "decompress")]
     let buffers = {
         let mut buffers = buffers;
-        super::decompress::decompress(&mut json, &mut buffers).map_err(|(extension, problem)| {
-            compressed(name, extension, format!("could not be decoded: {problem}"))
-        })?;
+        let held = of_json + bytes.len() as u64 + distinct_bytes(&buffers);
+        super::decompress::decompress(name, &mut json, &mut buffers, (held, memory_limit))?;
         buffers
     };
     let is_decoded = buffers.len() > n_in_file;
     drop_missing(&mut json, notices);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
-    // Memory includes the caller's copy of the file. Buffers and images can share bytes: count those once.
-    let mut seen = HashSet::new();
-    let loaded = buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes));
-    let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
+    // Memory includes the caller's copy of the file.
+    let loaded = distinct_bytes(buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes)));
     let of_packed = packed.as_ref().map_or(0, Vec::len) as u64;
-    let held = of_json + bytes.len() as u64 + of_packed + loaded.sum::<u64>();
+    let held = of_json + bytes.len() as u64 + of_packed + loaded;
     MemoryError::check(held, memory_limit)?;
     Ok(GltfContents { json, text, packed, is_decoded, root, buffers, images, bytes: held })
+}
+
+/// Total size of buffers and images, bytes. Those that share their bytes count once.
+fn distinct_bytes<'a>(all: impl IntoIterator<Item = &'a Arc<Vec<u8>>>) -> u64 {
+    let mut seen = HashSet::new();
+    let distinct = all.into_iter().filter(|bytes| seen.insert(Arc::as_ptr(bytes)));
+    distinct.map(|bytes| bytes.len() as u64).sum()
 }
 
 /// Names of external buffers and images; empty if the file cannot be read.
@@ -272,7 +276,7 @@ fn check_version(json: &Value) -> Result<(), GltfError> {
     }
 }
 
-fn compressed(name: &str, extension: &str, problem: String) -> GltfError {
+pub(super) fn compressed(name: &str, extension: &str, problem: String) -> GltfError {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let output = format!("{stem}-plain.glb");
     GltfError::Compressed { extension: extension.into(), problem, name: name.into(), output }

@@ -1,9 +1,10 @@
 //! Decompresses Draco and meshopt geometry into plain buffer views, before the document is interpreted.
 
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use ::gltf::json::accessor::Accessor;
-use ::gltf::json::mesh::Semantic;
+use ::gltf::json::mesh::{Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
 use draco_core::{
@@ -17,8 +18,11 @@ use meshoptimizer_rs::{Error, Workspace};
 use serde_json::{Map, Value, json};
 
 use super::accessor::{MAX_ELEMENTS, Source};
+use super::container::compressed;
 use super::pack::{INDICES, VERTICES, bounds, push};
 use super::root::{DRACO, MESHOPT, typed};
+use super::size::check_values;
+use super::{GltfError, MemoryError};
 
 /// Limit on the decompressed size of all streams, bytes. A file of a few hundred bytes can claim any size.
 const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
@@ -27,40 +31,117 @@ const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
 /// from rounding to f32.
 const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
+/// Bytes of four values of a vertex while weights are corrected.
+const VALUE_BYTES: u64 = 16;
+
 type Buffers = Vec<Arc<Vec<u8>>>;
 
-/// Decodes all compressed geometry, appending buffers to `buffers` and the document.
+/// Memory of the decompressed geometry. Bytes are taken before they are decoded or copied.
+struct Budget {
+    /// Bytes of the document and of the buffers in the file.
+    held: u64,
+    taken: u64,
+    memory_limit: u64,
+}
+
+impl Budget {
+    fn check(&self, bytes: u64) -> Result<(), Fault> {
+        let taken = self.taken.saturating_add(bytes);
+        if taken > MAX_DECOMPRESSED_BYTES {
+            return Err(too_large());
+        }
+        Ok(MemoryError::check(self.held.saturating_add(taken), self.memory_limit)?)
+    }
+
+    fn take(&mut self, bytes: u64) -> Result<(), Fault> {
+        self.check(bytes)?;
+        self.taken += bytes;
+        Ok(())
+    }
+}
+
+/// Why geometry cannot be decompressed.
+enum Fault {
+    /// What is wrong with the stream.
+    Stream(String),
+    /// A limit on memory or work is exceeded.
+    Limit(GltfError),
+}
+
+impl From<String> for Fault {
+    fn from(problem: String) -> Self {
+        Self::Stream(problem)
+    }
+}
+
+impl From<&str> for Fault {
+    fn from(problem: &str) -> Self {
+        Self::Stream(problem.to_owned())
+    }
+}
+
+impl From<MemoryError> for Fault {
+    fn from(error: MemoryError) -> Self {
+        Self::Limit(error.into())
+    }
+}
+
+fn too_large() -> Fault {
+    Fault::Stream(format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20))
+}
+
+/// Decodes all compressed geometry, appending buffers to `buffers` and the document. Each stream is decoded once.
+/// `name`: name of the file. `held`: bytes of the document and its buffers; `memory_limit`: limit on these and the
+/// decoded bytes.
 ///
 /// # Errors
-/// Returns the name of the extension and what is wrong with its stream.
-pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
-    let (mut left, n_in_file) = (MAX_DECOMPRESSED_BYTES, buffers.len());
+/// [`GltfError::Compressed`], [`GltfError::Memory`], [`GltfError::TooLarge`].
+pub(super) fn decompress(
+    name: &str,
+    json: &mut Value,
+    buffers: &mut Buffers,
+    (held, memory_limit): (u64, u64),
+) -> Result<(), GltfError> {
+    let n_in_file = buffers.len();
+    let mut budget = Budget { held, taken: 0, memory_limit };
+    let fault = |extension| {
+        move |fault| match fault {
+            Fault::Stream(problem) => compressed(name, extension, format!("could not be decoded: {problem}")),
+            Fault::Limit(error) => error,
+        }
+    };
+    let mut last = DRACO;
     for extension in MESHOPT {
         for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
             let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
-            let bytes = meshopt(&packed, buffers, left).map_err(|problem| (extension, problem))?;
+            let bytes = meshopt(&packed, buffers, &mut budget).map_err(fault(extension))?;
             let length = bytes.len();
-            left = left.saturating_sub(length as u64);
             let buffer = push_buffer(json, buffers, bytes);
             let view = &mut json["bufferViews"][number];
             (view["buffer"], view["byteOffset"], view["byteLength"]) =
                 (buffer.into(), 0.into(), length.into());
+            last = extension;
         }
     }
+    // Primitives by the buffer view of their stream.
+    let mut streams: BTreeMap<u64, Vec<(String, Value)>> = BTreeMap::new();
     for m in 0..json["meshes"].as_array().map_or(0, Vec::len) {
         for p in 0..json["meshes"][m]["primitives"].as_array().map_or(0, Vec::len) {
             let place = format!("/meshes/{m}/primitives/{p}");
             let Some(packed) = take(json, &place, DRACO) else { continue };
-            let before = buffers.len();
-            draco(json, buffers, &place, &packed, left).map_err(|problem| (DRACO, problem))?;
-            left = left.saturating_sub(buffers[before..].iter().map(|b| b.len() as u64).sum());
+            let view = packed["bufferView"].as_u64().unwrap_or(u64::MAX);
+            streams.entry(view).or_default().push((place, packed));
         }
+    }
+    for (view, primitives) in streams {
+        draco(json, buffers, view, &primitives, &mut budget).map_err(fault(DRACO))?;
     }
     if buffers.len() > n_in_file {
         // A document that cannot be parsed is reported when it is read.
         if let Ok(root) = typed(json) {
+            check_corrections(&root, n_in_file)?;
             correct_bounds(json, &root, buffers, n_in_file);
-            normalise_weights(json, &root, buffers, n_in_file);
+            normalise_weights(json, &root, buffers, n_in_file, &mut budget).map_err(fault(last))?;
         }
     }
     let Some(document) = json.as_object_mut() else { return Ok(()) };
@@ -82,6 +163,41 @@ fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)
         accessor.sparse.is_none() && view.is_some_and(|view| view.buffer.value() >= first)
     };
     root.accessors.iter().enumerate().filter(move |(_, accessor)| is_decoded(accessor))
+}
+
+/// Checks the number of values that [`correct_bounds`] and [`normalise_weights`] read: any number of accessors can share
+/// the decoded bytes.
+///
+/// # Errors
+/// [`GltfError::TooLarge`].
+fn check_corrections(root: &Root, first: usize) -> Result<(), GltfError> {
+    let width = |accessor: &Accessor| match &accessor.type_ {
+        Checked::Valid(kind) => kind.multiplicity() as u64,
+        Checked::Invalid => 0,
+    };
+    let values = |accessor: &Accessor| accessor.count.0.saturating_mul(width(accessor));
+    let bounded = decoded(root, first).filter(|(_, a)| a.min.is_some() || a.max.is_some());
+    let of_bounds = bounded.map(|(_, accessor)| values(accessor)).fold(0, u64::saturating_add);
+    let weighted = weight_sets(root, first).into_iter().flatten().flat_map(<[usize; 2]>::from);
+    let accessors = weighted.filter_map(|number| root.accessors.get(number));
+    check_values(accessors.map(values).fold(of_bounds, u64::saturating_add))
+}
+
+/// Accessors of joints and of weights for each set of a vertex.
+type WeightSets = Vec<(usize, usize)>;
+
+/// The distinct sets of joint weights of all primitives that have decoded weights.
+fn weight_sets(root: &Root, first: usize) -> Vec<WeightSets> {
+    let decoded: HashSet<usize> = decoded(root, first).map(|(number, _)| number).collect();
+    let of_primitive = |primitive: &Primitive| {
+        let accessor = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(Index::value);
+        let of_set = |set| Some((accessor(Semantic::Joints(set))?, accessor(Semantic::Weights(set))?));
+        (0..).map_while(of_set).collect::<WeightSets>()
+    };
+    let all = root.meshes.iter().flat_map(|mesh| &mesh.primitives).map(of_primitive);
+    let mut seen = HashSet::new();
+    all.filter(|sets| sets.iter().any(|(_, weights)| decoded.contains(weights)) && seen.insert(sets.clone()))
+        .collect()
 }
 
 /// Recomputes the bounds `min` and `max`, because decoding a quantised stream does not return exactly the values that
@@ -108,16 +224,17 @@ fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize
 
 /// Scales joint weights to a sum of 1, and sets joints with weight 0 to joint 0, as glTF requires. The encoder's
 /// rounding can change the sums and make small weights 0.
-fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first: usize) {
-    let decoded: Vec<usize> = decoded(root, first).map(|(number, _)| number).collect();
-    let mut done = Vec::new();
-    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-        let accessor = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(Index::value);
-        let of_set = |set| Some((accessor(Semantic::Joints(set))?, accessor(Semantic::Weights(set))?));
-        let sets: Vec<(usize, usize)> = (0..).map_while(of_set).collect();
-        if done.contains(&sets) || !sets.iter().any(|(_, weights)| decoded.contains(weights)) {
-            continue;
-        }
+fn normalise_weights(
+    json: &mut Value,
+    root: &Root,
+    buffers: &mut Buffers,
+    first: usize,
+    budget: &mut Budget,
+) -> Result<(), Fault> {
+    for sets in weight_sets(root, first) {
+        let count = |accessor: usize| root.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
+        let vertices = sets.iter().map(|&(joints, weights)| count(joints).saturating_add(count(weights)));
+        budget.check(vertices.fold(0, u64::saturating_add).saturating_mul(VALUE_BYTES))?;
         let source = Source { root, buffers };
         let read = |&(joints, weights): &(usize, usize)| {
             let joints = source.unsigned::<4>(joints as u32, "joints").ok()?;
@@ -143,6 +260,7 @@ fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first
         }
         for ((joints, weights), (new_joints, new_weights)) in sets.iter().zip(values) {
             let n = new_weights.len();
+            budget.take(n as u64 * (8 * u64::from(is_named) + VALUE_BYTES * u64::from(is_off)))?;
             if is_named {
                 let bytes = new_joints.iter().flatten().flat_map(|&joint| (joint as u16).to_le_bytes());
                 put_vertices(json, buffers, *joints, bytes.collect(), UNSIGNED_SHORT, n);
@@ -152,8 +270,8 @@ fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first
                 put_vertices(json, buffers, *weights, bytes.collect(), FLOAT, n);
             }
         }
-        done.push(sets);
     }
+    Ok(())
 }
 
 /// Replaces the values of a four-component accessor of `n` vertices. `bytes`: the new values, little-endian, of the
@@ -167,7 +285,8 @@ fn put_vertices(
     n: usize,
 ) {
     let view = json!({ "byteStride": bytes.len() / n.max(1), "target": VERTICES });
-    if fill(json, buffers, accessor, bytes, view, component_type, n).is_ok()
+    let view = push_view(json, buffers, bytes, view);
+    if refer(json, accessor, view, component_type, n).is_ok()
         && let Some(accessor) = json["accessors"][accessor].as_object_mut()
     {
         for key in ["normalized", "sparse", "min", "max"] {
@@ -200,13 +319,11 @@ fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
     buffers.get(number("buffer")?)?.get(start..start.checked_add(number("byteLength")?)?)
 }
 
-fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, String> {
+fn meshopt(packed: &Value, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
     let number =
         |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_DECOMPRESSED_BYTES).map_or(0, |n| n as usize);
     let source = bytes_of(packed, buffers).ok_or("its stream is cut off")?;
-    if (number("count") as u64).saturating_mul(number("byteStride") as u64) > left {
-        return Err(format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20));
-    }
+    budget.take((number("count") as u64).saturating_mul(number("byteStride") as u64))?;
     let (count, stride, work) = (number("count"), number("byteStride"), &mut Workspace::default());
     let filter = packed["filter"].as_str().unwrap_or("NONE");
     let mut decode = || {
@@ -227,62 +344,84 @@ fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, Stri
         }
         Ok::<_, Error>(bytes)
     };
-    decode().map_err(|_| "its stream is damaged or has an unknown mode".to_owned())
+    decode().map_err(|_| "its stream is damaged or has an unknown mode".into())
 }
 
-/// Decodes a Draco stream into the accessors of its primitive.
+/// Decodes the Draco stream in buffer view `view` into the accessors of its primitives. `primitives`: JSON pointer and
+/// extension of each.
 fn draco(
     json: &mut Value,
     buffers: &mut Buffers,
-    place: &str,
-    packed: &Value,
-    left: u64,
-) -> Result<(), String> {
-    let view = packed["bufferView"].as_u64().unwrap_or(u64::MAX) as usize;
-    let source = json["bufferViews"].get(view).and_then(|view| bytes_of(view, buffers));
+    view: u64,
+    primitives: &[(String, Value)],
+    budget: &mut Budget,
+) -> Result<(), Fault> {
+    let source = json["bufferViews"].get(view as usize).and_then(|view| bytes_of(view, buffers));
     let limits = DecodeLimits::default()
         .with_max_points(MAX_ELEMENTS)
         .with_max_faces(2 * MAX_ELEMENTS)
-        .with_max_decoded_bytes(left);
+        .with_max_decoded_bytes(MAX_DECOMPRESSED_BYTES.saturating_sub(budget.taken));
     let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
     let mut mesh = Mesh::new();
     MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| match error.kind() {
-        ErrorKind::LimitExceeded => {
-            format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20)
-        }
-        _ => "its stream is damaged or has an unsupported version".to_owned(),
+        ErrorKind::LimitExceeded => too_large(),
+        _ => "its stream is damaged or has an unsupported version".into(),
     })?;
+    // glTF aligns vertex attributes to 4 bytes. All attributes count, also those that no primitive uses, because each
+    // takes time to decode.
+    let stride = |attribute: &PointAttribute| element_size(attribute).next_multiple_of(4);
+    let strides: usize = (0..mesh.num_attributes()).map(|a| stride(mesh.attribute(a))).sum();
+    let [points, faces] = [mesh.num_points(), mesh.num_faces()].map(|n| n as u64);
+    budget.take(points.saturating_mul(strides.max(4) as u64).saturating_add(12 * faces))?;
 
-    let primitive = json.pointer(place).and_then(Value::as_object).cloned().unwrap_or_default();
-    for (name, id) in packed["attributes"].as_object().into_iter().flatten() {
-        let accessor = primitive.get("attributes").and_then(|a| a[name].as_u64());
-        let id = id.as_u64().and_then(|id| u32::try_from(id).ok());
-        let attribute = id.and_then(|id| mesh.attribute_by_unique_id(id));
-        let (Some(accessor), Some(attribute)) = (accessor, attribute) else {
-            return Err(format!("its stream has no attribute for {name}"));
-        };
-        let (kind, element) = layout(attribute).ok_or_else(|| format!("{name} has an unknown type"))?;
-        // glTF aligns vertex attributes to 4 bytes.
-        let stride = element.next_multiple_of(4);
-        let mut bytes = Vec::with_capacity(stride * mesh.num_points());
-        for point in 0..mesh.num_points() as u32 {
-            let start = attribute.mapped_index(PointIndex(point)).0 as usize * element;
-            let value = attribute.buffer().data().get(start..start + element);
-            bytes.extend_from_slice(value.ok_or_else(|| format!("{name} is cut off"))?);
-            bytes.resize(bytes.len().next_multiple_of(4), 0);
+    let mut views: HashMap<u32, usize> = HashMap::new();
+    let mut of_indices = None;
+    for (place, packed) in primitives {
+        let of_primitive = |key: &str| json.pointer(place).map(|primitive| primitive[key].clone());
+        let (attributes, indices) = (of_primitive("attributes"), of_primitive("indices"));
+        for (name, id) in packed["attributes"].as_object().into_iter().flatten() {
+            let accessor = attributes.as_ref().and_then(|a| a[name].as_u64());
+            let id = id.as_u64().and_then(|id| u32::try_from(id).ok());
+            let attribute = id.and_then(|id| Some((id, mesh.attribute_by_unique_id(id)?)));
+            let (Some(accessor), Some((id, attribute))) = (accessor, attribute) else {
+                return Err(format!("its stream has no attribute for {name}").into());
+            };
+            let kind = component_type(attribute).ok_or_else(|| format!("{name} has an unknown type"))?;
+            let view = match views.get(&id) {
+                Some(&view) => view,
+                None => {
+                    let bytes = values(&mesh, attribute).ok_or_else(|| format!("{name} is cut off"))?;
+                    let view = json!({ "byteStride": stride(attribute), "target": VERTICES });
+                    push_view(json, buffers, bytes, view)
+                }
+            };
+            views.insert(id, view);
+            refer(json, accessor as usize, view, kind, mesh.num_points())?;
         }
-        let view = json!({ "byteStride": stride, "target": VERTICES });
-        fill(json, buffers, accessor as usize, bytes, view, kind, mesh.num_points())?;
+        let view = *of_indices.get_or_insert_with(|| {
+            let corners = mesh.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes());
+            push_view(json, buffers, corners.collect(), json!({ "target": INDICES }))
+        });
+        let indices = match indices.and_then(|indices| indices.as_u64()) {
+            Some(indices) => indices as usize,
+            None => push(json, "accessors", json!({ "type": "SCALAR" })),
+        };
+        refer(json, indices, view, UNSIGNED_INT, 3 * mesh.num_faces())?;
+        json.pointer_mut(place).ok_or("its primitive does not exist")?["indices"] = indices.into();
     }
-    let corners = mesh.faces().iter().flatten();
-    let bytes: Vec<u8> = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();
-    let indices = match primitive.get("indices").and_then(Value::as_u64) {
-        Some(indices) => indices as usize,
-        None => push(json, "accessors", json!({ "type": "SCALAR" })),
-    };
-    fill(json, buffers, indices, bytes, json!({ "target": INDICES }), UNSIGNED_INT, 3 * mesh.num_faces())?;
-    json.pointer_mut(place).ok_or("its primitive does not exist")?["indices"] = indices.into();
     Ok(())
+}
+
+/// Bytes of an attribute's value of each point, padded to 4 bytes; `None` if the stream lacks values.
+fn values(mesh: &Mesh, attribute: &PointAttribute) -> Option<Vec<u8>> {
+    let element = element_size(attribute);
+    let mut bytes = Vec::with_capacity(element.next_multiple_of(4) * mesh.num_points());
+    for point in 0..mesh.num_points() as u32 {
+        let start = attribute.mapped_index(PointIndex(point)).0 as usize * element;
+        bytes.extend_from_slice(attribute.buffer().data().get(start..start + element)?);
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    Some(bytes)
 }
 
 /// glTF component types.
@@ -290,9 +429,9 @@ const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
 
-/// Component type and element size; `None` for types that glTF lacks.
-fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
-    let kind = match attribute.data_type() {
+/// glTF component type; `None` for types that glTF lacks.
+fn component_type(attribute: &PointAttribute) -> Option<u32> {
+    Some(match attribute.data_type() {
         DataType::Int8 => 5120,
         DataType::Uint8 => 5121,
         DataType::Int16 => 5122,
@@ -300,23 +439,29 @@ fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
         DataType::Uint32 => UNSIGNED_INT,
         DataType::Float32 => FLOAT,
         _ => return None,
-    };
-    Some((kind, attribute.data_type().byte_length() * usize::from(attribute.num_components())))
+    })
 }
 
-/// Makes an accessor refer to `bytes`. `count`: number of elements of the accessor.
-fn fill(
+/// Size of an attribute's value, bytes.
+fn element_size(attribute: &PointAttribute) -> usize {
+    attribute.data_type().byte_length() * usize::from(attribute.num_components())
+}
+
+/// Appends a buffer view of `bytes`. `view`: its other properties.
+fn push_view(json: &mut Value, buffers: &mut Buffers, bytes: Vec<u8>, mut view: Value) -> usize {
+    view["byteLength"] = bytes.len().into();
+    view["buffer"] = push_buffer(json, buffers, bytes).into();
+    push(json, "bufferViews", view)
+}
+
+/// Makes an accessor refer to buffer view `view`. `count`: number of elements of the accessor.
+fn refer(
     json: &mut Value,
-    buffers: &mut Buffers,
     accessor: usize,
-    bytes: Vec<u8>,
-    mut view: Value,
+    view: usize,
     component_type: u32,
     count: usize,
 ) -> Result<(), String> {
-    view["byteLength"] = bytes.len().into();
-    view["buffer"] = push_buffer(json, buffers, bytes).into();
-    let view = push(json, "bufferViews", view);
     let accessor: &mut Map<String, Value> = json["accessors"]
         .get_mut(accessor)
         .and_then(Value::as_object_mut)

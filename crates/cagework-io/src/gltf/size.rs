@@ -150,6 +150,19 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     Ok(bytes)
 }
 
+/// Checks the number of values that are decoded before [`check`], while compressed geometry is unpacked.
+///
+/// # Errors
+/// [`GltfError::TooLarge`].
+#[cfg(feature = "decompress")]
+pub(super) fn check_values(count: u64) -> Result<(), GltfError> {
+    if count <= MAX_DECODED_VALUES {
+        return Ok(());
+    }
+    let what = "values of accessors that share compressed geometry";
+    Err(GltfError::TooLarge { what, count, limit: MAX_DECODED_VALUES })
+}
+
 fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
     instances.chunk_by(|a, b| a.mesh == b.mesh)
 }

@@ -12,7 +12,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::NpzError;
-use crate::memory::MemoryError;
+use crate::memory::{Expansion, MemoryError};
 use crate::shown::shown;
 
 /// Limit on the size of an array's header, bytes. NumPy writes 100 to 200.
@@ -110,9 +110,29 @@ pub(super) fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
 /// Reads an archive of arrays.
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
-    /// Total bytes of the arrays read so far, counting raw and converted values.
+    budget: Budget,
+}
+
+/// Bytes of the arrays of a file, counted before they are unpacked.
+pub(super) struct Budget {
+    /// Size of the file, bytes.
+    file: u64,
+    /// Total bytes of the arrays read so far.
     unpacked: u64,
     memory_limit: u64,
+}
+
+impl Budget {
+    pub(super) fn new(file: u64, memory_limit: u64) -> Self {
+        Self { file, unpacked: 0, memory_limit }
+    }
+
+    /// Counts an array. Raw and converted values are in memory at the same time.
+    fn take(&mut self, array: &'static str, bytes: u64) -> Result<(), NpzError> {
+        self.unpacked = self.unpacked.saturating_add(bytes);
+        MemoryError::check(self.unpacked.saturating_mul(2), self.memory_limit)?;
+        Expansion::TEXT.check(self.unpacked, self.file).map_err(|problem| NpzError::Array { array, problem })
+    }
 }
 
 impl<'a> Archive<'a> {
@@ -121,7 +141,8 @@ impl<'a> Archive<'a> {
     /// # Errors
     /// [`NpzError::Zip`] if the bytes are not a zip archive.
     pub(super) fn new(bytes: &'a [u8], memory_limit: u64) -> Result<Self, NpzError> {
-        Ok(Self { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit })
+        let budget = Budget::new(bytes.len() as u64, memory_limit);
+        Ok(Self { zip: ZipArchive::new(Cursor::new(bytes))?, budget })
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
@@ -142,12 +163,12 @@ pub(super) fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyA
 }
 
 pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
-    let Archive { zip, unpacked, memory_limit } = archive;
+    let Archive { zip, budget } = archive;
     let mut entry = match zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
         other => other?,
     };
-    NpyArray::read(name, &mut entry, (unpacked, *memory_limit)).map(Some)
+    NpyArray::read(name, &mut entry, budget).map(Some)
 }
 
 /// Bytes that determine the header's length: magic, version, and a length of 2 or 4 bytes.
@@ -186,12 +207,12 @@ fn lengths(text: &str) -> Option<Vec<usize>> {
 }
 
 impl NpyArray {
-    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `unpacked`:
-    /// bytes of the arrays read so far; `memory_limit`: limit on these bytes.
+    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `budget`
+    /// counts its bytes first.
     pub(super) fn read(
         name: &'static str,
         from: &mut impl std::io::Read,
-        (unpacked, memory_limit): (&mut u64, u64),
+        budget: &mut Budget,
     ) -> Result<Self, NpzError> {
         let fault = |problem: String| NpzError::Array { array: name, problem };
         let bad = || fault("is not in NumPy's .npy format".into());
@@ -217,8 +238,7 @@ impl NpyArray {
         let needed = needed.ok_or_else(|| {
             fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}"))))
         })?;
-        *unpacked = unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
-        MemoryError::check(*unpacked, memory_limit)?;
+        budget.take(name, needed)?;
         let mut data = Vec::new();
         // Reading one byte more than needed detects streams that are too long.
         unpack(needed.saturating_add(1), &mut data)?;

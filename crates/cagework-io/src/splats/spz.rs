@@ -14,7 +14,7 @@ use super::{
     RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, band_0, color_of, log_scale, unit_byte,
 };
 use crate::error::WriteError;
-use crate::memory::{MemoryError, check_unpacked};
+use crate::memory::{Expansion, MemoryError};
 
 const MAGIC: [u8; 4] = *b"NGSP";
 const HEADER: usize = 16;
@@ -133,7 +133,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
         return Err(SplatError::Count { count, needed, found: size });
     }
     let needed = count * each;
-    check_unpacked(needed, size).map_err(SplatError::Damaged)?;
+    Expansion::SPLATS.check(needed, size).map_err(SplatError::Damaged)?;
     let window = if is_zstd { ZSTD_WINDOW.max(needed) } else { 0 };
     let held = needed + 2 * size + window;
     MemoryError::check(held, memory_limit)?;

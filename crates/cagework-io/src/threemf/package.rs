@@ -13,7 +13,7 @@ use rawzip::{CompressionMethod, DataDescriptorOutput, Error, ZipArchive, ZipArch
 
 use super::xml::attributes;
 use crate::error::WriteError;
-use crate::memory::{MemoryError, check_unpacked};
+use crate::memory::{Expansion, MemoryError};
 use crate::polygons::PolygonsError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
@@ -186,7 +186,7 @@ impl<'a> Package<'a> {
         // The factor 2 covers the text and its parsed content: a vertex or triangle takes less memory than its text,
         // which has at least 27 or 34 characters.
         MemoryError::check(self.unpacked.saturating_mul(2), self.memory_limit)?;
-        check_unpacked(self.unpacked, self.size).map_err(PolygonsError::Syntax)?;
+        Expansion::TEXT.check(self.unpacked, self.size).map_err(PolygonsError::Syntax)?;
         let mut bytes = Vec::with_capacity(size as usize + 1);
         let mut unpack = |from: &mut dyn Read| from.take(size.saturating_add(1)).read_to_end(&mut bytes);
         let unpacked = match entry.method {

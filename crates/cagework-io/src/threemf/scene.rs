@@ -13,6 +13,10 @@ use crate::shown::shown;
 /// Limit on the nesting of components.
 const MAX_DEPTH: u32 = 64;
 
+/// Limit on the bytes of the names of all instances: 256 each for the largest number of instances. Names are copied for
+/// each instance, and commands list them.
+const MAX_NAME_BYTES: u64 = 256 * MAX_OBJECTS;
+
 /// Memory of an instance and of its group of faces, bytes, without the two copies of its name.
 const INSTANCE_BYTES: u64 = 300;
 
@@ -49,6 +53,10 @@ struct Totals {
     vertices: u64,
     triangles: u64,
     instances: u64,
+    /// Bytes of the names of the instances, and number of instances that take the name of an object that contains
+    /// them.
+    names: u64,
+    unnamed: u64,
     depth: u32,
 }
 
@@ -57,6 +65,8 @@ impl Totals {
         self.vertices = self.vertices.saturating_add(other.vertices);
         self.triangles = self.triangles.saturating_add(other.triangles);
         self.instances = self.instances.saturating_add(other.instances);
+        self.names = self.names.saturating_add(other.names);
+        self.unnamed = self.unnamed.saturating_add(other.unnamed);
         self.depth = self.depth.max(other.depth);
     }
 }
@@ -153,15 +163,15 @@ impl Scene {
             (all.instances, "objects", MAX_OBJECTS),
             (all.vertices, "vertices", MAX_ELEMENTS),
             (all.triangles, "triangles", MAX_TRIANGLES),
+            (all.names, "characters in the names of its objects", MAX_NAME_BYTES),
         ] {
             if count > limit {
                 return Err(PolygonsError::TooMany { count, what, limit });
             }
         }
-        let names = self.parts.iter().flat_map(|(_, part)| &part.objects).map(|object| object.name.len());
         // Each instance and its group have a copy of the name.
-        let each = INSTANCE_BYTES + 2 * names.max().unwrap_or(0) as u64;
-        let kept = self.bytes.saturating_add(each.saturating_mul(all.instances));
+        let of_instances = INSTANCE_BYTES * all.instances + 2 * all.names;
+        let kept = self.bytes.saturating_add(of_instances);
         Polygons::check_memory(kept, all.vertices, 3 * all.triangles, memory_limit)?;
         if all.triangles == 0 && self.parts[0].1.items.is_empty() {
             return Err(PolygonsError::NoItems);
@@ -210,10 +220,16 @@ impl Scene {
             vertices: object.vertices.len() as u64,
             triangles: object.triangles.len() as u64,
             instances: 1,
+            names: 0,
+            unnamed: 1,
             depth: 0,
         };
         for component in &object.components {
             size.add(self.measure(self.target(key.0, component)?, depth + 1, states)?);
+        }
+        if !object.name.is_empty() {
+            let inherited = std::mem::take(&mut size.unnamed).saturating_mul(object.name.len() as u64);
+            size.names = size.names.saturating_add(inherited);
         }
         size.depth += 1;
         states[key.0][key.1] = Measurement::Done(size);

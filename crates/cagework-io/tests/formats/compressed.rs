@@ -291,6 +291,78 @@ fn damaged_streams_are_errors() {
 }
 
 /// The humanoid sample, with skin and clip.
+/// The decoded bytes of a stream are in memory once, also if several primitives use it.
+#[test]
+fn a_draco_stream_of_many_primitives_is_decoded_once() {
+    const POINTS: usize = 10_000;
+    let places: Vec<u8> =
+        (0..POINTS).flat_map(|v| [v as f32, (v % 2) as f32, 0.0]).flat_map(f32::to_le_bytes).collect();
+    let mut positions = PointAttribute::new();
+    positions.init(GeometryAttributeType::Position, 3, DataType::Float32, false, POINTS);
+    positions.buffer_mut().write(0, &places);
+    let mut mesh = Mesh::new();
+    mesh.set_num_points(POINTS);
+    mesh.add_attribute(positions);
+    mesh.set_num_faces(POINTS - 2);
+    for f in 0..POINTS as u32 - 2 {
+        mesh.set_face(FaceIndex(f), [f, f + 1, f + 2].map(PointIndex));
+    }
+    let mut b = draco(&stream_of(mesh));
+    let mut again = b.primitive(0).clone();
+    // The other primitives use only the triangles of the stream, 120 kB each.
+    again["attributes"] = json!({});
+    again["extensions"][DRACO]["attributes"] = json!({});
+    again.as_object_mut().unwrap().remove("indices");
+    let primitives = b.json["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.extend(vec![again; 200]);
+    let model = Model::read_within("x.glb", b.glb(), &mut |_| None, 8 << 20).unwrap();
+    assert_eq!(model.triangles.len(), POINTS - 2);
+}
+
+/// The size of a stream is checked against the memory limit before the stream is decoded.
+#[test]
+fn streams_are_priced_before_they_are_decoded() {
+    let mut b = meshopt("EXT_meshopt_compression", 0);
+    for view in b.json["bufferViews"].as_array_mut().unwrap() {
+        if let Some(packed) = view.get_mut("extensions") {
+            packed["EXT_meshopt_compression"]["count"] = json!(1 << 20);
+        }
+    }
+    let found = Model::read_within("x.glb", with_fallback(&b), &mut |_| None, 8 << 20).unwrap_err();
+    let message = found.to_string();
+    assert!(message.contains("needs about 13 MiB of memory, more than the limit of 8 MiB"), "{message}");
+}
+
+/// Bounds and weights are corrected for each accessor, and any number of accessors can share a stream.
+#[test]
+fn corrections_of_decoded_values_are_limited() {
+    let limit = "more than the limit of 268435456";
+    let mut b = meshopt("EXT_meshopt_compression", 0);
+    let bounded = b.json["accessors"][0].clone();
+    let unused = json!({
+        "bufferView": bounded["bufferView"], "componentType": 5126, "count": 1 << 20, "type": "VEC3", "min": [0],
+    });
+    for _ in 0..100 {
+        b.push("accessors", unused.clone());
+    }
+    let message = read("x.glb", &with_fallback(&b)).unwrap_err().to_string();
+    assert!(message.contains(&format!("compressed geometry: 314572824, {limit}")), "{message}");
+
+    let mut b = meshopt("EXT_meshopt_compression", 0);
+    let mut four = json!({
+        "bufferView": bounded["bufferView"], "componentType": 5126, "count": 1 << 20, "type": "VEC4",
+    });
+    let weights = b.push("accessors", four.clone());
+    four["componentType"] = json!(5121);
+    for _ in 0..40 {
+        let joints = b.push("accessors", four.clone());
+        let rigged = json!({ "attributes": { "JOINTS_0": joints, "WEIGHTS_0": weights } });
+        b.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(rigged);
+    }
+    let message = read("x.glb", &with_fallback(&b)).unwrap_err().to_string();
+    assert!(message.contains(limit), "{message}");
+}
+
 fn humanoid() -> Vec<u8> {
     let sample = samples::build("humanoid").unwrap();
     write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap()

@@ -112,6 +112,10 @@ fn accessors_that_do_not_fit_are_errors() {
             fault_of(|b| b.json["bufferViews"][0]["byteStride"] = json!(1_u64 << 62)),
             "accessor 0 has 8 elements",
         ),
+        (
+            fault_of(|b| b.json["bufferViews"][0]["byteStride"] = 4.into()),
+            "accessor 0 has elements of 12 bytes every 4 bytes, so they overlap: export it again",
+        ),
         (fault_of(|b| b.json["bufferViews"][0]["byteLength"] = 10_000.into()), "extends beyond its buffer"),
         (fault_of(|b| b.json["bufferViews"][0]["byteOffset"] = json!(u64::MAX)), "extends beyond its buffer"),
         (

@@ -315,4 +315,17 @@ fn entries_are_unpacked_up_to_the_size_of_their_shapes() {
     });
     let message = read_weights_npz(&honest, LIMIT).unwrap_err().to_string();
     assert!(message.contains("needs about 77 MiB of memory, more than the limit of 1 MiB"), "{message}");
+    // The limit of a small file does not depend on the memory limit.
+    let long = rewritten(|n, d| {
+        let place = d.windows(19).position(|w| w == b"(4,), }            ").filter(|_| n == "data.npy");
+        Some(match place {
+            Some(place) => [&d[..place], b"(40000000,), }     ", &d[place + 19..]].concat(),
+            None => d,
+        })
+    });
+    let message = read_weights_npz(&long, u64::MAX).unwrap_err().to_string();
+    assert!(
+        message.contains("'data': its ") && message.contains("limit of 64 MiB or 100 times"),
+        "{message}"
+    );
 }

@@ -352,6 +352,19 @@ fn doubling_components_are_refused_before_they_are_placed() {
     assert!(doubled(16).contains("MiB of memory, more than the limit of 64 MiB"), "{}", doubled(16));
 }
 
+/// Objects without a name take the name of the object that contains them.
+#[test]
+fn names_are_counted_for_every_placement() {
+    let (name, component) = ("n".repeat(40_000), "<component objectid=\"1\"/>".repeat(999));
+    let named = format!(
+        "<object id=\"1\">{}</object><object id=\"2\" name=\"{name}\"><components>{component}</components></object>",
+        cube_mesh()
+    );
+    let refused = "a.3mf: its build shows 40000000 characters in the names of its objects, more than the limit of \
+                   33554432: split the model";
+    assert_eq!(fault_of(&named, "<item objectid=\"2\"/>"), refused);
+}
+
 #[test]
 fn zip_bombs_are_refused_by_their_declared_and_their_real_size() {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
@@ -397,7 +410,7 @@ fn repeated_elements_names_and_copies_are_refused() {
         );
     }
     let named = fault_of(&object(&format!(" name=\"{}\"", "n".repeat(10_000)), ""), &items(5000));
-    assert!(named.contains("MiB of memory, more than the limit of 64 MiB"), "{named}");
+    assert!(named.contains("shows 50000000 characters in the names of its objects"), "{named}");
 
     let at = |k| format!("<item objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 {k} 0 0\"/>");
     let resources = object("", &format!("<!--{}-->", "x".repeat(1 << 20)));
