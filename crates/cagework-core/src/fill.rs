@@ -13,12 +13,13 @@ pub const MAX_EDGES: usize = 64;
 /// no loop. `faces`: the faces around the holes, of vertices at `at`.
 pub fn loops(edges: &[[u32; 2]], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     // Store edges without direction, as a face next to the hole may be inverted.
-    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for &[from, to] in edges {
-        next.entry(from).or_default().push(to);
-        next.entry(to).or_default().push(from);
-    }
+    // A way from a vertex is the vertex at its other end, and whether the edge has the opposite direction only.
     let directed: HashSet<[u32; 2]> = edges.iter().copied().collect();
+    let mut next: BTreeMap<u32, Vec<(u32, bool)>> = BTreeMap::new();
+    for &[from, to] in edges {
+        next.entry(from).or_default().push((to, false));
+        next.entry(to).or_default().push((from, !directed.contains(&[to, from])));
+    }
     let normals = normals_where_holes_meet(&next, at, faces);
     let mut found = Vec::new();
     let starts: Vec<u32> = next.keys().copied().collect();
@@ -39,15 +40,11 @@ pub fn loops(edges: &[[u32; 2]], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<Vec<u3
                 };
                 // At a vertex where holes meet, the loop continues with the next edge around the vertex: the faces that
                 // fill the hole lie in between.
-                let rank = |to: u32| (u8::from(!directed.contains(&[from, to])), angle(to));
-                let order = |a: &usize, b: &usize| {
-                    let (a, b) = (rank(ways[*a]), rank(ways[*b]));
-                    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-                };
-                let best = (0..ways.len()).min_by(order).unwrap_or(0);
-                let to = ways.swap_remove(best);
+                let ranked = ways.iter().map(|&(to, is_opposite)| (is_opposite, angle(to)));
+                let best = (0..).zip(ranked).min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+                let (to, _) = ways.swap_remove(best.map_or(0, |(k, _)| k));
                 if let Some(back) = next.get_mut(&to)
-                    && let Some(k) = back.iter().position(|&v| v == from)
+                    && let Some(k) = back.iter().position(|&(v, _)| v == from)
                 {
                     back.swap_remove(k);
                 }
@@ -72,7 +69,7 @@ pub fn loops(edges: &[[u32; 2]], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<Vec<u3
 
 /// Sums of the unit normals of the faces around each vertex where holes meet.
 fn normals_where_holes_meet(
-    next: &BTreeMap<u32, Vec<u32>>,
+    next: &BTreeMap<u32, Vec<(u32, bool)>>,
     at: &[DVec3],
     faces: &[Vec<u32>],
 ) -> HashMap<u32, DVec3> {

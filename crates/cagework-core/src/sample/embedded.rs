@@ -429,8 +429,8 @@ impl<'a> Sampler<'a> {
 
     /// Whether a point on a facet lies inside another part of the cage, so that the facet is not a wall there.
     fn is_within(&self, facet: u32, barycentric: [f64; 3]) -> bool {
-        let Overlaps { low, high, .. } = self.overlaps;
-        if self.overlaps.parts.is_empty() {
+        let Overlaps { low, high } = self.overlaps;
+        if low.x > high.x {
             return false;
         }
         let corners = self.lists.triangle(facet).corners;

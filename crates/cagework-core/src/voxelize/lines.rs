@@ -41,43 +41,33 @@ pub struct Lines {
     met: Vec<bool>,
 }
 
-/// Overlaps of parts of the cage, detected along grid lines.
-#[derive(Clone, Debug, PartialEq)]
+/// Bounding box of all walls inside other parts of the cage, in cells, as found along grid lines. Empty, with infinite
+/// corners, if no parts overlap.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlaps {
-    /// Pairs of overlapping components; a component that intersects itself is paired with itself.
-    pub parts: Vec<[u32; 2]>,
-    /// Lowest corner of the bounding box of all walls inside other parts, in cells.
+    /// Lowest corner.
     pub low: DVec3,
-    /// Highest corner of the bounding box of all walls inside other parts, in cells.
+    /// Highest corner.
     pub high: DVec3,
 }
 
 impl Default for Overlaps {
     fn default() -> Self {
-        Self { parts: Vec::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
+        Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
     }
 }
 
 impl Overlaps {
-    /// Adds the position of a wall inside a part, and the pair of parts that overlap there.
-    fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
-        (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
-        if let Some(pair) = parts.map(|[a, b]| [a.min(b), a.max(b)])
-            && !self.parts.contains(&pair)
-        {
-            self.parts.push(pair);
-        }
+    /// Box that includes both corners.
+    fn including(self, low: DVec3, high: DVec3) -> Self {
+        Self { low: self.low.min(low), high: self.high.max(high) }
     }
 
     /// Overlaps found along any of the three axes.
     #[must_use]
     pub fn of(lines: &[Lines; 3]) -> Self {
-        let mut all = Self::default();
-        for overlaps in lines.iter().map(|lines| &lines.overlaps) {
-            overlaps.parts.iter().for_each(|&pair| all.add(Some(pair), overlaps.low));
-            (all.low, all.high) = (all.low.min(overlaps.low), all.high.max(overlaps.high));
-        }
-        all
+        let all = lines.iter().map(|lines| &lines.overlaps);
+        all.fold(Self::default(), |all, found| all.including(found.low, found.high))
     }
 }
 
@@ -95,7 +85,7 @@ impl Lines {
                 found.push((u + n_u * v, Hit { triangle, ..hit }));
             });
         }
-        // Counting sort by line, insertion sort by position within a line.
+        // Counting sort by line, then a stable sort by position within a line.
         let mut start = vec![0u32; n_lines + 1];
         for (line, _) in &found {
             start[*line as usize + 1] += 1;
@@ -106,11 +96,11 @@ impl Lines {
         let mut next = start.clone();
         let mut hits = vec![Hit { t: 0.0, triangle: 0, barycentric: [0.0; 2], faces_up: false }; found.len()];
         for (line, hit) in found {
-            let (first, end) = (start[line as usize] as usize, next[line as usize] as usize);
-            let before = hits[first..end].partition_point(|h| h.t.total_cmp(&hit.t).is_le());
-            hits.copy_within(first + before..end, first + before + 1);
-            hits[first + before] = hit;
+            hits[next[line as usize] as usize] = hit;
             next[line as usize] += 1;
+        }
+        for line in start.windows(2) {
+            hits[line[0] as usize..line[1] as usize].sort_by(|a, b| a.t.total_cmp(&b.t));
         }
         let mut met = vec![false; cage.faces().len()];
         hits.iter().for_each(|hit| met[cage.face_of_facet()[hit.triangle as usize] as usize] = true);
@@ -125,13 +115,12 @@ impl Lines {
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let (mut kept, mut open, mut group) = (0, Vec::new(), Vec::new());
+        let (mut kept, mut group) = (0, Vec::new());
         for line in 0..self.start.len() - 1 {
             let range = self.range(line);
             self.start[line] = kept as u32;
-            // Winding number along the line, and the parts that contain the point.
+            // Winding number along the line.
             let mut depth = 0;
-            open.clear();
             let mut first = range.start;
             while first < range.end {
                 let place = self.hits[first].t;
@@ -155,16 +144,7 @@ impl Lines {
                         let mut wall = DVec3::splat(hit.t);
                         wall[u] = f64::from(line as u32 % self.n_u);
                         wall[v] = f64::from(line as u32 / self.n_u);
-                        let part = part(&hit);
-                        let other = open.iter().find(|&&open| open != part).unwrap_or(&part);
-                        self.overlaps.add((depth > before).then_some([*other, part]), wall);
-                    }
-                    if depth <= 0 {
-                        open.clear();
-                    } else if depth > before {
-                        open.push(part(&hit));
-                    } else if let Some(k) = open.iter().rposition(|&open| open == part(&hit)) {
-                        open.remove(k);
+                        self.overlaps = self.overlaps.including(wall, wall);
                     }
                 }
                 first += n;
