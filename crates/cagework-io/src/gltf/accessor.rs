@@ -16,6 +16,10 @@ use super::{GltfError, get};
 /// and weld.
 pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 
+/// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Decoding this many
+/// takes 1 to 2 s.
+pub(super) const MAX_DECODED_VALUES: u64 = 1 << 28;
+
 /// Limit on implicit zeros: elements of an accessor without buffer view that sparse values do not set.
 const MAX_IMPLICIT_ZEROS: u64 = 1 << 20;
 
@@ -275,4 +279,17 @@ fn type_of(components: usize) -> Type {
 
 fn fault(accessor: u32, problem: String) -> GltfError {
     GltfError::Accessor { accessor, problem }
+}
+
+/// Checks the number of values that are decoded before `size::check`, while compressed geometry is unpacked.
+///
+/// # Errors
+/// [`GltfError::TooLarge`].
+#[cfg(feature = "decompress")]
+pub(super) fn check_values(count: u64) -> Result<(), GltfError> {
+    if count <= MAX_DECODED_VALUES {
+        return Ok(());
+    }
+    let what = "values of accessors that share compressed geometry";
+    Err(GltfError::TooLarge { what, count, limit: MAX_DECODED_VALUES })
 }

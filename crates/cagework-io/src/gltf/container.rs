@@ -276,12 +276,6 @@ fn check_version(json: &Value) -> Result<(), GltfError> {
     }
 }
 
-pub(super) fn compressed(name: &str, extension: &str, problem: String) -> GltfError {
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let output = format!("{stem}-plain.glb");
-    GltfError::Compressed { extension: extension.into(), problem, name: name.into(), output }
-}
-
 #[cfg(not(feature = "decompress"))]
 fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
     let has = |object: &Value, extension: &str| object["extensions"].get(extension).is_some();
@@ -293,7 +287,7 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
             mesh["primitives"].as_array().into_iter().flatten().any(|primitive| has(primitive, extension))
         });
         if required || in_views || in_meshes {
-            return Err(compressed(name, extension, "no decoder is available".into()));
+            return Err(GltfError::compressed(name, extension, "no decoder is available".into()));
         }
     }
     Ok(())

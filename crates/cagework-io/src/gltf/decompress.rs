@@ -17,11 +17,9 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Workspace};
 use serde_json::{Map, Value, json};
 
-use super::accessor::{MAX_ELEMENTS, Source};
-use super::container::compressed;
+use super::accessor::{MAX_ELEMENTS, Source, check_values};
 use super::pack::{INDICES, VERTICES, bounds, push};
 use super::root::{DRACO, MESHOPT, typed};
-use super::size::check_values;
 use super::{GltfError, MemoryError};
 
 /// Limit on the decompressed size of all streams, bytes. A file of a few hundred bytes can claim any size.
@@ -106,7 +104,9 @@ pub(super) fn decompress(
     let mut budget = Budget { held, taken: 0, memory_limit };
     let fault = |extension| {
         move |fault| match fault {
-            Fault::Stream(problem) => compressed(name, extension, format!("could not be decoded: {problem}")),
+            Fault::Stream(problem) => {
+                GltfError::compressed(name, extension, format!("could not be decoded: {problem}"))
+            }
             Fault::Limit(error) => error,
         }
     };

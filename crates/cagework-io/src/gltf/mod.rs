@@ -217,6 +217,15 @@ pub enum GltfError {
     },
 }
 
+impl GltfError {
+    /// Compressed geometry that cannot be read. `name`: name of the file.
+    fn compressed(name: &str, extension: &str, problem: String) -> Self {
+        let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+        let output = format!("{stem}-plain.glb");
+        Self::Compressed { extension: extension.into(), problem, name: name.into(), output }
+    }
+}
+
 /// A parsed glTF file.
 #[derive(Clone, Debug)]
 pub(crate) struct GltfDocument {

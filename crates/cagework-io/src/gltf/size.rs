@@ -10,7 +10,7 @@ use ::gltf::json::accessor::Accessor;
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 
-use super::accessor::MAX_ELEMENTS;
+use super::accessor::{MAX_DECODED_VALUES, MAX_ELEMENTS};
 use super::container::bytes_of_json;
 use super::geometry::surface;
 use super::scene::Instance;
@@ -23,10 +23,6 @@ pub(crate) const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 /// Limit on the number of primitives, and also on the number of morph targets, each summed over all nodes. A primitive
 /// or target takes several KB in an export.
 pub(crate) const MAX_PRIMITIVES: u64 = 1 << 16;
-
-/// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Decoding this many
-/// takes 1 to 2 s.
-const MAX_DECODED_VALUES: u64 = 1 << 28;
 
 /// Limit on the implicit zeros of all attributes and morph targets, summed over all nodes; or [`ZEROS_PER_BYTE`] per byte
 /// of the document, if that is more. Each zero takes up to 100 bytes in an export.
@@ -148,19 +144,6 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     let rig = rig_bytes(document) + JOINT_BYTES * joints + KEY_BYTES * keys;
     MemoryError::check((held + bytes + reading + rig).saturating_add(copied_bytes(document)), limit)?;
     Ok(bytes)
-}
-
-/// Checks the number of values that are decoded before [`check`], while compressed geometry is unpacked.
-///
-/// # Errors
-/// [`GltfError::TooLarge`].
-#[cfg(feature = "decompress")]
-pub(super) fn check_values(count: u64) -> Result<(), GltfError> {
-    if count <= MAX_DECODED_VALUES {
-        return Ok(());
-    }
-    let what = "values of accessors that share compressed geometry";
-    Err(GltfError::TooLarge { what, count, limit: MAX_DECODED_VALUES })
 }
 
 fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
