@@ -29,6 +29,7 @@ const DIRECTORY_BYTES: usize = 1 << 20;
 
 /// Limit on the memory for the relationships in [`is_3mf`], bytes.
 const MAX_RELATIONSHIPS: u64 = 1 << 20;
+
 /// First bytes of an encrypted part (Secure Content Extension, appendix D).
 const ENCRYPTED: &[u8] = b"%3McF";
 
