@@ -18,7 +18,7 @@ use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, KindArg};
 use cagework_core::field as field_options;
-use cagework_core::options::{self, BindOptions, Choice, Number};
+use cagework_core::options::{self, Choice, Number, parse_grid};
 use cagework_io::{Interpolation, MAX_SECONDS, ModelFormat, UpAxis};
 use clap::builder::{
     NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser,
@@ -116,7 +116,7 @@ pub(crate) struct BindArgs {
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    #[arg(short, long, help = options::GRID.about(), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = options::GRID.about(), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
     /// Write the rest pose as reconstructed from the weights; the file extension selects the format.
     #[arg(short, long, value_name = "FILE")]

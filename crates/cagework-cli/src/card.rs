@@ -26,6 +26,9 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     row("method", format!("{}, {}, {} ({place})", method(report), solver(report), report.backend));
     let [x, y, z] = report.dims;
     row("grid", format!("{} ({x} x {y} x {z} cells)", report.grid));
+    if let Some(reason) = &report.grid_reason {
+        row("", reason.clone());
+    }
     let cells = report.cells;
     row(
         "cells",

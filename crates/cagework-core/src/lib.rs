@@ -23,6 +23,7 @@ pub mod grid;
 pub mod inpaint;
 pub mod levels;
 pub mod mesh;
+pub mod narrow;
 pub mod nearest;
 pub mod options;
 pub mod progress;

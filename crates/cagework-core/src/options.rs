@@ -6,9 +6,12 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Smallest value of the `grid` option: cells along the longest side of the cage's box.
+/// Value of the `grid` option that chooses the number of cells for the cage ([`crate::bind::choose_grid`]). The command
+/// and Python also accept the word "auto".
+pub const AUTO_GRID: u32 = 0;
+/// Smallest number of the `grid` option: cells along the longest side of the cage's box.
 pub const MIN_GRID: u32 = 8;
-/// Largest value of the `grid` option.
+/// Largest number of the `grid` option.
 pub const MAX_GRID: u32 = 512;
 
 /// An option whose values are a fixed set of names.
@@ -208,10 +211,14 @@ pub struct Slider {
 /// The `grid` option: cells along the longest side of the cage's box.
 pub const GRID: Number = Number {
     name: "grid",
-    help: "Cells along the longest side of the cage",
+    help: "Cells along the longest side of the cage; auto takes 64, 96, 128 or 192, so that the narrowest part and gap \
+           are four cells wide if possible",
     unit: "cells",
-    allowed: "a whole number from 8 to 512",
-    is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
+    allowed: "auto (0) or a whole number from 8 to 512",
+    is_allowed: |g| {
+        g == f64::from(AUTO_GRID)
+            || g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g)
+    },
     slider: None,
 };
 /// The `tau` option: convergence threshold for delta ([`crate::solve::stop`]).
@@ -299,7 +306,8 @@ impl Number {
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindOptions {
     /// Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
-    /// Default 64.
+    /// [`AUTO_GRID`] (0, or "auto" in JSON that is read) chooses the number for the cage. Default 0.
+    #[serde(deserialize_with = "grid_or_auto")]
     pub grid: u32,
     /// Discretisation of the cage. Default embedded.
     pub method: Method,
@@ -342,7 +350,7 @@ pub struct BindOptions {
 impl Default for BindOptions {
     fn default() -> Self {
         Self {
-            grid: 64,
+            grid: AUTO_GRID,
             method: Method::default(),
             solver: Solver::default(),
             preconditioner: Preconditioner::default(),
@@ -357,6 +365,30 @@ impl Default for BindOptions {
             held: 0,
             extra_points: 0,
         }
+    }
+}
+
+/// Parses a value of the `grid` option: "auto" or a number of cells.
+///
+/// # Errors
+/// [`RangeError`] if the value is not allowed.
+pub fn parse_grid(text: &str) -> Result<u32, RangeError> {
+    if text == AUTO { Ok(AUTO_GRID) } else { GRID.parse(text) }
+}
+
+/// Word for [`AUTO_GRID`].
+const AUTO: &str = "auto";
+
+fn grid_or_auto<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum GridOrAuto {
+        Cells(u32),
+        Word(String),
+    }
+    match GridOrAuto::deserialize(deserializer)? {
+        GridOrAuto::Cells(cells) => Ok(cells),
+        GridOrAuto::Word(word) => parse_grid(&word).map_err(serde::de::Error::custom),
     }
 }
 
@@ -414,11 +446,17 @@ mod tests {
     #[test]
     fn numbers_out_of_range_are_errors_with_the_range() {
         let refused = GRID.parse::<u32>("7").unwrap_err();
-        assert_eq!(refused.to_string(), "grid is 7; it must be a whole number from 8 to 512");
+        assert_eq!(refused.to_string(), "grid is 7; it must be auto (0) or a whole number from 8 to 512");
+        assert_eq!([parse_grid("auto"), parse_grid("0"), parse_grid("96")], [Ok(0), Ok(0), Ok(96)]);
+        assert!(parse_grid("coarse").is_err() && parse_grid("4").is_err());
+        let options = |json: &str| serde_json::from_str::<BindOptions>(json).map(|options| options.grid);
+        assert_eq!(options(r#"{"grid":"auto"}"#).unwrap(), AUTO_GRID);
+        assert_eq!([options("{}").unwrap(), options(r#"{"grid":32}"#).unwrap()], [AUTO_GRID, 32]);
+        assert!(options(r#"{"grid":"fine"}"#).is_err());
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
         assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());
-        assert_eq!(GRID.about(), "Cells along the longest side of the cage: a whole number from 8 to 512");
+        assert!(GRID.about().ends_with("if possible: auto (0) or a whole number from 8 to 512"));
         let sparse = BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().unwrap_err();
         assert_eq!(
             sparse.to_string(),
@@ -430,7 +468,7 @@ mod tests {
     /// Texts of ranges contain literals, because they are constants.
     #[test]
     fn texts_of_ranges_agree_with_the_limits() {
-        assert_eq!(GRID.allowed, format!("a whole number from {MIN_GRID} to {MAX_GRID}"));
+        assert_eq!(GRID.allowed, format!("auto (0) or a whole number from {MIN_GRID} to {MAX_GRID}"));
         assert!(MAX_ITERATIONS.help.ends_with(&format!("at most {MAX_CYCLES} V-cycles")));
         assert_eq!(SMOOTH_STEPS.allowed, "a whole number from 0 to 3");
         assert!(SMOOTH_STEPS.check(3).is_ok() && SMOOTH_STEPS.check(4).is_err());

@@ -23,8 +23,12 @@ pub struct BindReport {
     pub adapter: Option<String>,
     /// Number of threads of the solver.
     pub threads: usize,
-    /// Requested number of cells along the longest side.
+    /// Number of cells along the longest side, as requested or chosen.
     pub grid: u32,
+    /// Explanation of a number that was chosen automatically.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "typescript", ts(optional))]
+    pub grid_reason: Option<String>,
     /// Cells of the grid along x, y, z.
     pub dims: [u32; 3],
     /// Edge lengths of a cell, object units.

@@ -6,9 +6,11 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+use crate::bind::fineness;
 use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::Boundary as _;
+use crate::narrow::NarrowPlaces;
 use crate::options::{BindOptions, Method};
 use crate::voxelize::CellKind;
 use crate::voxelize::classic::{place_grid, voxelize_classic};
@@ -63,9 +65,10 @@ impl Slice {
     ) -> Self {
         let controls = controls.into();
         let cage = controls.surface();
+        let cells = fineness::choose(options, &NarrowPlaces::new(controls), |_| true).cells;
         match options.method {
             Method::Embedded => {
-                let grid = Grid::cubic(cage.bounds(), options.grid);
+                let grid = Grid::cubic(cage.bounds(), cells);
                 let lines = shoot_lines(cage, &grid);
                 let cells = Cells::finest(&lines, grid, &votes(&lines, &grid));
                 let cells = cells.with(controls, &lines);
@@ -76,9 +79,9 @@ impl Slice {
                 })
             }
             Method::Classic => {
-                let (dims, origin, cell) = place_grid(cage, options.grid, options.cell_shape);
+                let (dims, origin, cell) = place_grid(cage, cells, options.cell_shape);
                 let grid = Grid { dims: dims.to_array(), origin, cell };
-                let cells = voxelize_classic(controls, options.grid, options.cell_shape);
+                let cells = voxelize_classic(controls, cells, options.cell_shape);
                 Self::of(&grid, axis, fraction, |cell| cells.kinds[grid.index(cell)])
             }
         }

@@ -1,5 +1,6 @@
 //! Poses of a cage that is replaced by another one around the same model.
 
+use cagework_core::bind::fineness::ROUGH_GRID;
 use cagework_core::deform::deform_bound;
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindError, BindOptions, ControlSet, Controls, bind};
@@ -24,7 +25,8 @@ pub fn carry_poses(
     poses: &[Vec3],
 ) -> Result<Vec<Vec3>, BindError> {
     let some = &model[..model.len().min(MODEL_SAMPLES)];
-    let bound = bind(&[new, some].concat(), old, &BindOptions::default(), &NoProgress)?;
+    let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
+    let bound = bind(&[new, some].concat(), old, &options, &NoProgress)?;
     let carried = poses.chunks_exact(Controls::from(old).n_controls()).flat_map(|pose| {
         let mut moved = deform_bound(&bound.weights, &bound.frames, pose);
         moved.truncate(new.len());

@@ -6,7 +6,7 @@ use cagework_cage::check::check_smooth;
 use cagework_cage::generate::{CageReport, Rings};
 use cagework_cage::{CageOptions, generate_of_kind};
 use cagework_core::crossing::notices;
-use cagework_core::options::{GRID, SMOOTH_STEPS};
+use cagework_core::options::{GRID, SMOOTH_STEPS, parse_grid};
 use cagework_core::{Cage as CoreCage, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
 use glam::DVec3;
@@ -236,11 +236,18 @@ pub(crate) fn generate_cage(
     Ok(Cage { rings: generated.rings, ..cage })
 }
 
-/// Lists the faults of a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
+/// Number of cells, or "auto".
+#[derive(FromPyObject)]
+pub(crate) enum GridArgument {
+    Cells(f64),
+    Word(String),
+}
+
+/// Lists the faults of a cage: check_cage(cage, points=None, grid="auto", smooth=None) -> list of dict
 ///
 /// cage: a Cage, or an object with vertices and faces such as trimesh.Trimesh, which need not be closed; points: [n, 3]
-/// that should be inside; grid: cells along the longest side, to find parts thinner than a cell; smooth: steps of
-/// subdivision, by default those of the Cage.
+/// that should be inside; grid: grid of the bind, whose unresolved places are reported; smooth: steps of subdivision, by
+/// default those of the Cage.
 ///
 /// Each problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points),
 /// message and fixes. A cage without errors can be bound.
@@ -251,15 +258,19 @@ pub(crate) fn generate_cage(
 /// >>> [problem["message"] for problem in cw.check_cage(cage, mesh.vertices) if problem["severity"] == "error"]
 /// []
 #[pyfunction]
-#[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
+#[pyo3(signature = (cage, points = None, grid = GridArgument::Cells(0.0), smooth = None))]
 pub(crate) fn check_cage<'py>(
     py: Python<'py>,
     cage: &Bound<'py, PyAny>,
     points: Option<&Bound<'py, PyAny>>,
-    grid: f64,
+    grid: GridArgument,
     smooth: Option<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    GRID.check(grid).map_err(error::option)?;
+    let grid = match grid {
+        GridArgument::Cells(cells) => GRID.check(cells).map(|()| cells as u32),
+        GridArgument::Word(word) => parse_grid(&word),
+    };
+    let grid = grid.map_err(error::option)?;
     let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
     let smooth = smooth.map_or(Ok(own), steps)?;
     let vertices = cage.getattr("vertices")?;
@@ -268,6 +279,6 @@ pub(crate) fn check_cage<'py>(
     let mesh = PolygonMesh { positions, faces: arrays::faces(&cage.getattr("faces")?)? };
     let points = points.map(|points| arrays::points("points", points, None, origin)).transpose()?;
     let inside = points.as_ref().map(arrays::Points::as_slice);
-    let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid as u32), smooth))?;
+    let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid), smooth))?;
     dictionary(py, &check.problems)
 }

@@ -1,6 +1,7 @@
 //! Pulling of the model's surface. It runs in a separate worker, so that binds and long frames of the page do not block
 //! it.
 
+use cagework_core::bind::fineness::ROUGH_GRID;
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Frames, TriMesh, bind};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull};
@@ -94,7 +95,8 @@ impl Puller {
         let mesh = TriMesh { positions: points(positions), triangles: triangles.as_chunks().0.to_vec() };
         let set = control_set(cage)?;
         let probes = Probes::new(&mesh, &set)?;
-        let bound = bind(probes.points(), &set, &BindOptions::default(), &NoProgress)?;
+        let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
+        let bound = bind(probes.points(), &set, &options, &NoProgress)?;
         let pull = Pull::new(&mesh, &set, probes, &bound.frames.folded(&bound.weights))?;
         Ok(Self { pull, drag: None })
     }

@@ -12,8 +12,8 @@ import type { BindResult, Cage, File, NameOption } from "./types";
 
 /** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a barely visible difference. */
 const MAX_PIXEL_RATIO = 2;
-/** Default number of cells along the cage's longest side. */
-const GRID = 64;
+/** Default number of cells along the cage's longest side: automatic. */
+const GRID = 0;
 
 const STYLE = `
   :host { display: block; position: relative; min-height: 240px; aspect-ratio: 4 / 3; overflow: hidden;

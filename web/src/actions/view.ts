@@ -52,11 +52,11 @@ export function createView(
   const tools = (patch: Partial<Tools>) => engine().setTools({ ...store.get().tools, ...patch });
 
   const loadSlice = async (signal: AbortSignal) => {
-    const { slice, scene: now, bindOptions, cage } = store.get();
+    const { slice, scene: now, bindOptions, report, cage } = store.get();
     if (now.slice === "off" || !cage?.usable) return;
     store.set({ slice: { ...slice, busy: true } });
     try {
-      await follow(signal, ctx.session().loadSlice(slice.axis, slice.position, bindOptions.grid));
+      await follow(signal, ctx.session().loadSlice(slice.axis, slice.position, report?.grid ?? bindOptions.grid));
     } finally {
       store.set({ slice: { ...store.get().slice, busy: false } });
       scene({});

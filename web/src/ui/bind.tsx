@@ -25,7 +25,8 @@ import { Icon } from "./icons";
 import { Plot } from "./plot";
 import { CompareTable, ReportCard } from "./report";
 
-const GRIDS = [32, 64, 128, 256];
+/** Numbers of cells that the panel offers; 0 is automatic. */
+const GRIDS = [0, 32, 64, 128, 256];
 const SPARSIFY = [0, 0.00001, 0.001] as const;
 
 export function BindPanel({ app }: { app: App }) {
@@ -121,7 +122,7 @@ function Ways({ app }: { app: App }) {
       <Segments
         label={options.method === "classic" && options.cell_shape === "box" ? T.bind.gridEach : T.bind.grid}
         values={GRIDS}
-        labels={String}
+        labels={(cells) => (cells === 0 ? T.bind.auto : String(cells))}
         {...option("grid")}
       />
       <Segments

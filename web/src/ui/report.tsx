@@ -37,7 +37,7 @@ export function ReportCard({ report }: { report: BindReport }) {
       <Facts
         rows={[
           [T.report.method, `${T.report.methods[report.method]}, ${solverName(report)}`],
-          [T.report.grid, T.report.cells(report.dims.join(" × "))],
+          [T.report.grid, T.report.cells(report.dims.join(" × "), report.grid_reason)],
           [T.report.computedOn, report.backend === "gpu" ? T.report.gpu(report.adapter) : T.report.cpu],
           [T.report.restMean, scientific(report.rest_error.mean_rel)],
           [T.report.restLargest, scientific(report.rest_error.max_rel)],

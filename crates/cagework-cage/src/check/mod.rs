@@ -60,7 +60,7 @@ pub enum Code {
     UnusedVertex,
     /// Vertices of the model lie outside the cage.
     ModelOutside,
-    /// Parts of the cage are thinner than a grid cell.
+    /// Parts of the cage are thinner than a grid cell, or the faces of a vertex smaller.
     ThinPart,
     /// Any other reason for which [`Cage::new`] rejects the mesh.
     NotACage,
@@ -105,7 +105,7 @@ pub enum Fix {
     },
     /// Bind with this many cells along the cage's longest side.
     Grid {
-        /// Number of cells with which no measured part is thinner than a cell.
+        /// Number of cells that resolves all parts of the cage.
         cells: u32,
     },
 }
@@ -158,8 +158,8 @@ impl CageCheck {
 
 /// Checks a polygon mesh for use as a cage.
 ///
-/// `model`: positions that should lie inside. `grid`: number of cells along the longest side; parts of the cage that
-/// are thinner than a cell are reported.
+/// `model`: positions that should lie inside. `grid`: grid of the bind, as in
+/// [`BindOptions`](cagework_core::BindOptions); parts of the cage that it does not resolve are reported.
 #[must_use]
 pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
     check_smooth(mesh, model, grid, 0)

@@ -90,11 +90,3 @@ pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
 pub(super) fn one_sided(component: usize) -> String {
     format!("Component {component} has no inside: its faces cannot be turned consistently.")
 }
-
-/// Composes the message for thin places. `cells`: number of cells of a grid that resolves them, if it is within the
-/// limit.
-pub(super) fn thin(places: usize, cells: Option<u32>) -> String {
-    let places = counted(places, "place", "places");
-    let advice = cells.map_or("make the cage thicker".into(), |cells| format!("use a grid of {cells} cells"));
-    format!("The cage is thinner than a cell of the grid in {places}: {advice}.")
-}

@@ -4,24 +4,13 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
+use cagework_core::bind::fineness::wanted_cells;
 use cagework_core::cage::face_triangles;
 use cagework_core::controls::Controls;
-use cagework_core::geometry::distance_along;
 use cagework_core::mesh::PolygonMesh;
-use cagework_core::options::MAX_GRID;
-
-/// Number of triangles up to which thickness is measured at every triangle; larger cages are sampled evenly.
-const MAX_MEASURED_TRIANGLES: usize = 1500;
-
-/// Smallest thickness that is not reported, in cells. A thinner part may contain no cell centre and then has no
-/// unknowns.
-const MIN_CELLS: f64 = 1.0;
-
-/// Two faces bound a thin part if the cosine between one normal and the reversed normal of the other exceeds this, that
-/// is, if the angle between the faces is below 72.5 degrees. This includes the faces of a regular tetrahedron, at 70.5
-/// degrees. Faces at a larger angle form a corner of the cage, near which their distance tends to zero.
-const MIN_OPPOSITION_COSINE: f64 = 0.3;
+use cagework_core::narrow::{NarrowPlaces, Unresolved};
+use cagework_core::options::AUTO_GRID;
 
 /// Returns the indices of the valid faces, and reports the faults of all other faces. The vertices of a valid face
 /// exist, are finite and distinct; the face has an area and differs from all earlier faces.
@@ -77,53 +66,28 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     sound
 }
 
-/// Measures thickness by rays from triangle centres inwards to opposing triangles. Reports where the thickness is less
-/// than a grid cell. Returns the smallest thickness, object units; `None` if no ray hits an opposing triangle.
+/// Reports places that a grid does not resolve. `grid`: as in [`BindOptions`](cagework_core::BindOptions). Returns the width
+/// of the thinnest part, object units; `None` if no two faces are opposite.
 pub(super) fn report_thickness(
     controls: Controls<'_>,
     grid: Option<u32>,
     found: &mut Vec<Problem>,
 ) -> Option<f32> {
-    let cage = controls.surface();
-    let n = cage.triangles().len();
-    let triangles: Vec<[DVec3; 3]> = (0..n as u32).map(|t| cage.triangle_corners(t)).collect();
-    let cell = grid.map(|g| f64::from(cage.bounds().extent().max_element()) / f64::from(g.max(1)));
-    let facing = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
-    let mut thinnest = f64::INFINITY;
-    let (mut faces, mut points) = (Vec::new(), Vec::new());
-    for t in (0..n).step_by(n.div_ceil(MAX_MEASURED_TRIANGLES).max(1)) {
-        let [a, b, c] = triangles[t];
-        let normal = facing(triangles[t]);
-        let middle = (a + b + c) / 3.0;
-        let (mut way, mut nearest) = (f64::INFINITY, t);
-        for (other, &corners) in triangles.iter().enumerate().filter(|(other, _)| *other != t) {
-            // Flush walls of overlapping parts are at distance 0. They bound no thin part.
-            let hit = distance_along(middle, -normal, corners).filter(|distance| *distance > 0.0);
-            if let Some(distance) = hit.filter(|distance| *distance < way) {
-                (way, nearest) = (distance, other);
-            }
-        }
-        if normal.dot(facing(triangles[nearest])) > -MIN_OPPOSITION_COSINE {
-            // The two faces form a corner of the cage: they do not bound a thin part.
-            continue;
-        }
-        thinnest = thinnest.min(way);
-        if cell.is_some_and(|cell| way < MIN_CELLS * cell) {
-            faces.extend(controls.cage_face(cage.face_of_triangle()[t]));
-            points.push((middle - 0.5 * way * normal).as_vec3().to_array());
-        }
-    }
-    faces.dedup();
-    if let (Some(cell), Some(grid), false) = (cell, grid, points.is_empty()) {
-        let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * MIN_CELLS;
-        let cells = (cells <= f64::from(MAX_GRID)).then_some(cells as u32);
-        let count = points.len();
+    let places = NarrowPlaces::new(controls);
+    let cells = grid.map(|grid| if grid == AUTO_GRID { wanted_cells(&places) } else { grid });
+    if let Some(unresolved) = cells.and_then(|cells| places.unresolved(cells)) {
+        let Unresolved { parts, vertices, cells } = &unresolved;
         found.push(Problem {
-            places: Places { faces, points, ..Places::default() },
             fixes: cells.map(|cells| Fix::Grid { cells }).into_iter().collect(),
-            message: sentences::thin(count, cells),
-            ..problem(Code::ThinPart, Severity::Warning, count)
+            message: unresolved.to_string(),
+            places: Places {
+                vertices: vertices.clone(),
+                faces: parts.iter().map(|part| part.face).collect(),
+                points: parts.iter().map(|part| part.middle.as_vec3().to_array()).collect(),
+                ..Places::default()
+            },
+            ..problem(Code::ThinPart, Severity::Warning, parts.len() + vertices.len())
         });
     }
-    thinnest.is_finite().then_some(thinnest as f32)
+    places.thinnest().map(|place| place.width as f32)
 }

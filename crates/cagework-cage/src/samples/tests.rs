@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{PULLED_UNIT, Recipe, Sample, all, build, knot};
 use cagework_core::bind::bind;
+use cagework_core::bind::fineness::ROUGH_GRID;
 use cagework_core::cage::Cage;
 use cagework_core::frames::Frames;
 use cagework_core::geometry::winding_number;
@@ -64,7 +65,8 @@ fn the_last_pose_of_each_sample_is_that_of_its_pull() {
         let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
         let cage = Cage::new(&cage).unwrap();
         let weights = |points: &[Vec3]| {
-            let bound = bind(points, &cage, &BindOptions::default(), &NoProgress).unwrap();
+            let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
+            let bound = bind(points, &cage, &options, &NoProgress).unwrap();
             bound.frames.folded(&bound.weights)
         };
         let probes = Probes::new(&mesh, &cage).unwrap();

@@ -8,8 +8,7 @@ use cagework_cage::generate::{
     BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageKind, CageOptions, DETAIL, DIVISIONS, HULL_TARGET, Symmetry,
     TARGET, VOXELS,
 };
-use cagework_core::BindOptions;
-use cagework_core::options::{GRID, Number};
+use cagework_core::options::{GRID, Number, parse_grid};
 use cagework_io::MAX_CLIP_TIMES;
 use clap::{Args, ValueEnum};
 
@@ -155,7 +154,7 @@ pub(crate) struct CheckArgs {
     /// Model that should be inside the cage.
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
-    #[arg(short, long, help = format!("Report parts of the cage thinner than a cell of a grid with this many cells along its longest side: {}", GRID.allowed), default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
+    #[arg(short, long, help = format!("Report parts of the cage that a grid with this many cells along its longest side does not resolve: {}", GRID.allowed), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
     /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and makes
     /// vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces

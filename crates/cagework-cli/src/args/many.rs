@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use cagework_core::options::{self, BindOptions};
+use cagework_core::options::{self, parse_grid};
 use clap::Args;
 
-use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs, number};
+use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs};
 
 /// Arguments of `cagework refit`.
 #[derive(Args, Debug)]
@@ -48,7 +48,7 @@ pub(crate) struct RefitArgs {
     /// Skip outputs that are newer than their model, cage, pose and controls. Options are not compared.
     #[arg(long)]
     pub(crate) resume: bool,
-    #[arg(short, long, help = options::GRID.about(), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = options::GRID.about(), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use cagework_core::options::{self, BindOptions};
+use cagework_core::options::{self, parse_grid};
 use clap::Args;
 
-use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, mesh_help, model_help, number, obj_output};
+use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, mesh_help, model_help, obj_output};
 
 /// Files of the bound model, and files for the pose that the command finds.
 #[derive(Args, Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct PoseArgs {
     /// File for the pose of the cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
-    #[arg(short, long, help = format!("{}. The solver samples the gradients of the weights on this grid", options::GRID.about()), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = format!("{}. The solver samples the gradients of the weights on this grid", options::GRID.about()), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use cagework_core::options::{Choice, GRID};
-use cagework_core::{BindOptions, Coordinates};
+use cagework_core::Coordinates;
+use cagework_core::options::{Choice, GRID, parse_grid};
 use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -98,7 +98,7 @@ pub(crate) struct RenderArgs {
     /// Picture to write (.png).
     #[arg(short, long, value_name = "FILE", value_parser = png_output)]
     pub(crate) output: PathBuf,
-    #[arg(short, long, help = GRID.about(), default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
+    #[arg(short, long, help = GRID.about(), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::memory::{estimate, field_bytes};
-use super::pipeline::PreparedBind;
+use super::pipeline::{Fineness, PreparedBind};
 use super::points::{VertexCounts, WeldedPoints};
 use super::solving::{Solution, sample_fields, solve_fields};
 use super::voxels::{Voxelization, VoxelizedCage};
@@ -23,6 +23,7 @@ use crate::team::Team;
 pub struct SolvedCage<'a> {
     controls: Controls<'a>,
     options: BindOptions,
+    fineness: Fineness,
     voxelized: Arc<VoxelizedCage>,
     /// Solved fields. `[n_batches][n_rows]`
     fields: Vec<Vec<Row>>,
@@ -49,20 +50,34 @@ impl<'a> SolvedCage<'a> {
         let began = watch.now_ms();
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
-        let grid = Voxelization::grid(controls.surface(), &options);
         let none = VertexCounts { rows: 0, points: 0 };
-        let solving = estimate(controls, &grid, none, team.n_threads(), &options).bytes;
-        // The Jacobi solver keeps the fields of all batches in memory, so `solving` already includes them.
-        let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
-        let (needed, limit) = (solving + kept, options.memory_limit / 2);
+        let limit = options.memory_limit / 2;
+        let needed = |options: &BindOptions| {
+            let grid = Voxelization::grid(controls.surface(), options);
+            let solving = estimate(controls, &grid, none, team.n_threads(), options).bytes;
+            // The Jacobi solver keeps the fields of all batches in memory, so `solving` already includes them.
+            solving + if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) }
+        };
+        let fineness = Fineness::new(controls, &options, |options| needed(options) <= limit);
+        let options = BindOptions { grid: fineness.choice.cells, ..options };
+        let needed = needed(&options);
         if needed > limit {
             return Err(BindError::Memory { needed, limit });
         }
+        let grid = Voxelization::grid(controls.surface(), &options);
         let voxelized = Arc::new(VoxelizedCage::new(controls, grid, &options, team, &watch)?);
         let hierarchy = &voxelized.voxels.hierarchy;
         let (fields, mut solved) = solve_fields(hierarchy, &options, &voxelized.team, &watch)?;
         solved.field_bytes = fields.iter().map(|field| size_of_val(field.as_slice())).sum();
-        Ok(Self { controls, options, voxelized, fields, solved, elapsed_ms: watch.now_ms() - began })
+        Ok(Self {
+            controls,
+            options,
+            fineness,
+            voxelized,
+            fields,
+            solved,
+            elapsed_ms: watch.now_ms() - began,
+        })
     }
 
     /// Time that [`Self::new`] took for voxelization and solve, milliseconds.
@@ -97,8 +112,9 @@ impl<'a> SolvedCage<'a> {
         let needed = estimate(self.controls, &grid, mesh.count(), 0, &options);
         needed.check(mesh.count(), self.controls.n_controls(), options.memory_limit)?;
         let voxelized = Arc::clone(&self.voxelized);
+        let settings = (options, self.fineness.clone());
         let prepared =
-            PreparedBind::in_grid(mesh, self.controls, &options, voxelized, needed.bytes, began, &watch)?;
+            PreparedBind::in_grid(mesh, self.controls, settings, voxelized, needed.bytes, began, &watch)?;
         let blocks = sample_fields(prepared.stencils(), &self.fields, &self.voxelized.team);
         prepared.finish(Solution { blocks, solve_share: 0.0, ..self.solved.clone() }, &watch)
     }

@@ -26,8 +26,8 @@ use crate::voxelize::lines::Hit;
 /// Size of all coarser levels together relative to that of the finest: 1/8 + 1/64 + ...
 const COARSE_LEVELS_SHARE: f64 = 1.0 / 7.0;
 
-/// Number of cut cells per part of the cage's surface with the area of one cell face; the mean over all orientations.
-const CUT_PER_AREA: f64 = 1.5;
+/// Number of Dirichlet values of an arm that ends on the cage: a bent quad has four corners.
+const TERMS_PER_ARM: f64 = 4.0;
 
 /// Bytes per mesh vertex: the entry of its position in the hash table of positions, and its index.
 const ROW_BYTES: f64 = 44.0;
@@ -39,8 +39,8 @@ const POINT_BYTES: f64 = 470.0;
 /// Bytes per offset: three f64 for each of up to four matrices of [`Frames`](crate::frames::Frames).
 const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 
-/// Bytes per grid cell while lines and levels are built.
-const CELL_BYTES: f64 = 30.0;
+/// Bytes per grid cell: its row number, its state, and the votes of the lines along three axes.
+const CELL_BYTES: f64 = 7.0;
 
 /// Returns the size of the weights of `n_rows` vertices in bytes if no weight is dropped. The share of small weights is
 /// unknown before the solve: a threshold of 1e-5 keeps a third of the weights with 110 columns, and all of them with 8.
@@ -90,17 +90,18 @@ pub(super) fn estimate(
     options: &BindOptions,
 ) -> MemoryEstimate {
     let n_cells = grid.n_cells() as f64;
-    let (n_unknowns, n_cut) = unknowns(controls, grid);
+    let Counts { unknowns: n_unknowns, cut: n_cut, arms: n_arms } = counts(controls, grid);
     let n_columns = controls.n_controls();
     let n_batches = n_columns.div_ceil(LANES) as f64;
     let row = size_of::<Row>() as f64;
     // Threads beyond the number of batches stay idle and allocate no solution fields.
     let threads = threads.min(n_batches as usize);
 
-    let voxels = n_cells * (CELL_BYTES + if options.method == Method::Embedded { 7.0 } else { 5.0 });
-    let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
-    // Lines along the three axes cross the surface about as often as the surface cuts cells.
-    let lines = if options.method == Method::Embedded { n_cut * size_of::<Hit>() as f64 } else { 0.0 };
+    let voxels = n_cells * CELL_BYTES;
+    let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>()) as f64
+        + n_arms * TERMS_PER_ARM * size_of::<BoundaryTerm>() as f64;
+    // Each arm that ends on the cage is part of a line through it.
+    let lines = if options.method == Method::Embedded { n_arms * size_of::<Hit>() as f64 } else { 0.0 };
     let transfers = n_unknowns
         * (size_of::<RestrictRow>() as f64 / 8.0
             + size_of::<ProlongRow<2>>() as f64 * 3.0 / 8.0
@@ -109,12 +110,9 @@ pub(super) fn estimate(
         threads as f64 * row * (finest_rows + 2.0 * COARSE_LEVELS_SHARE * n_unknowns)
             + transfers * (1.0 + COARSE_LEVELS_SHARE)
     };
-    // V-cycles may stall if the cage has several parts. Conjugate gradients then take over and need five fields.
-    let of_fallback =
-        if controls.surface().component_of_face().iter().any(|&part| part > 0) { 5.0 } else { 0.0 };
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
-        Solver::Multigrid => on_levels((1.5 + of_fallback) * n_unknowns + n_cut),
+        Solver::Multigrid => on_levels(1.5 * n_unknowns + n_cut),
         // Five fields; the preconditioning V-cycle has another two and a half.
         Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
         Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),
@@ -153,30 +151,39 @@ pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions
         Solver::Jacobi => digits / decay,
     };
     let columns = controls.n_controls().div_ceil(LANES) * LANES;
-    unknowns(controls, grid).0 * columns as f64 * sweeps.min(options.max_iterations as f64)
+    counts(controls, grid).unknowns * columns as f64 * sweeps.min(options.max_iterations as f64)
 }
 
 pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
     let n_batches = controls.n_controls().div_ceil(LANES) as f64;
-    (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
+    (counts(controls, grid).unknowns * n_batches * size_of::<Row>() as f64) as u64
 }
 
-/// Estimates the numbers of unknowns and of cut cells.
-fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
-    let (volume, area) = volume_and_area(controls.surface());
-    let (cell, n_cells) = (grid.cell, grid.n_cells() as f64);
-    let of_cell = cell.x * cell.y * cell.z;
-    ((volume / of_cell).min(n_cells), (CUT_PER_AREA * area / of_cell.powf(2.0 / 3.0)).min(n_cells))
+/// Sizes of a discrete problem.
+struct Counts {
+    unknowns: f64,
+    /// Cells with a neighbour outside.
+    cut: f64,
+    /// Arms of stencils that end on the cage.
+    arms: f64,
 }
 
-/// Computes the enclosed volume of the cage (divergence theorem), and its area.
-fn volume_and_area(cage: &Cage) -> (f64, f64) {
+/// Estimates the sizes of the problem in a grid. A cell is cut if a step of one cell along some axis takes its centre
+/// through the surface. Therefore a surface with unit normal n cuts `max |n_k|` cells and `|n_x| + |n_y| + |n_z|` arms per
+/// area of a cell face.
+fn counts(controls: Controls<'_>, grid: &Grid) -> Counts {
+    let (cage, n_cells) = (controls.surface(), grid.n_cells() as f64);
     let origin = cage.bounds().center().as_dvec3();
-    (0..cage.triangles().len() as u32).fold((0.0, 0.0), |(volume, area), t| {
-        let [a, b, c]: [DVec3; 3] = cage.triangle_corners(t).map(|p| p - origin);
-        let normal = (b - a).cross(c - a);
-        (volume + a.dot(normal) / 6.0, area + 0.5 * normal.length())
-    })
+    let mut sum = Counts { unknowns: 0.0, cut: 0.0, arms: 0.0 };
+    for t in 0..cage.triangles().len() as u32 {
+        let [a, b, c]: [DVec3; 3] = cage.triangle_corners(t).map(|p| (p - origin) / grid.cell);
+        let area = 0.5 * (b - a).cross(c - a);
+        // Enclosed volume by the divergence theorem.
+        sum.unknowns += a.dot(area) / 3.0;
+        sum.cut += area.abs().max_element();
+        sum.arms += area.abs().element_sum();
+    }
+    Counts { unknowns: sum.unknowns.min(n_cells), cut: sum.cut.min(n_cells), arms: sum.arms }
 }
 
 #[cfg(test)]
@@ -185,16 +192,20 @@ mod tests {
     use crate::bind::bind;
     use crate::bind::voxels::Voxelization;
     use crate::cage::subdivided_box;
+    use crate::controls::{ControlSet, InnerElement};
+    use crate::mesh::PolygonMesh;
     use crate::progress::NoProgress;
-    use glam::Vec3;
+    use glam::{Quat, Vec3};
 
     #[test]
-    fn volume_and_area_of_a_box() {
+    fn counts_of_a_box() {
         let bounds = Bounds { min: Vec3::new(1.0, 2.0, 3.0), max: Vec3::new(3.0, 5.0, 7.0) };
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [2, 2, 2])).unwrap();
-        let (volume, area) = volume_and_area(&cage);
-        // A box with edges of 2, 3 and 4 has the volume 24 and the area 2 (6 + 8 + 12) = 52.
-        assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
+        let counts = counts((&cage).into(), &Grid::cubic(cage.bounds(), 8));
+        // 4 by 6 by 8 cells, with 2 (4 x 6 + 6 x 8 + 4 x 8) = 208 cell faces on the surface.
+        for (count, expected) in [(counts.unknowns, 192.0), (counts.cut, 208.0), (counts.arms, 208.0)] {
+            assert!((count - expected).abs() < 1e-3, "{count} {expected}");
+        }
     }
 
     /// Compares the estimate with the sweeps of the solvers on a cube, whose slowest mode the estimate assumes. Most
@@ -208,10 +219,57 @@ mod tests {
             let estimate = crate::bind::estimate_updates(&cage, &options).unwrap();
             let report = bind(&[Vec3::splat(0.5)], &cage, &options, &NoProgress).unwrap().report;
             let grid = Voxelization::grid(&cage, &options);
-            let sweeps = estimate / (8.0 * unknowns((&cage).into(), &grid).0);
+            let sweeps = estimate / (8.0 * counts((&cage).into(), &grid).unknowns);
             let share = sweeps / f64::from(report.iterations);
             assert!((1.0..most).contains(&share), "{solver:?}: {sweeps} for {}", report.iterations);
         }
+    }
+
+    /// The report's peak is the sum of the sizes of all arrays.
+    #[test]
+    fn estimate_is_within_15_percent_of_the_arrays() {
+        let cube = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [4; 3]);
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+        let bar = cube.positions.iter().map(|p| turn * Vec3::new(p.x, 0.2 * p.y, 0.1 * p.z)).collect();
+        let bar = PolygonMesh { positions: bar, ..cube.clone() };
+        let two = two_boxes();
+        let ball = InnerControls {
+            positions: vec![Vec3::splat(0.5)],
+            elements: vec![InnerElement::Point(0)],
+            radius: Some(0.2),
+        };
+        let usual = BindOptions { grid: 32, threads: 2, ..BindOptions::default() };
+        let cases = [
+            ("cube", &cube, None, usual),
+            ("cube, one thread", &cube, None, BindOptions { threads: 1, ..usual }),
+            ("ball", &cube, Some(ball), usual),
+            ("bar", &bar, None, BindOptions { grid: 64, ..usual }),
+            ("two boxes", &two, None, usual),
+            ("conjugate gradients", &cube, None, BindOptions { solver: Solver::ConjugateGradient, ..usual }),
+            ("Jacobi", &cube, None, BindOptions { solver: Solver::Jacobi, tau: 1e-2, ..usual }),
+            ("classic", &cube, None, BindOptions { method: Method::Classic, tau: 1e-2, ..usual }),
+        ];
+        for (name, mesh, inner, options) in cases {
+            let cage = Cage::new(mesh).unwrap();
+            let set = ControlSet::new(&cage, 0, inner.unwrap_or_default()).unwrap();
+            let point = (0..8).map(|k| mesh.positions[k] / 8.0).sum::<Vec3>();
+            let memory = bind(&[point], &set, &options, &NoProgress).unwrap().report.memory_bytes;
+            let ratio = memory.estimated as f64 / memory.peak as f64;
+            assert!((0.85..1.15).contains(&ratio), "{name}: {ratio:.3} of {} bytes", memory.peak);
+        }
+    }
+
+    /// Two plates beside each other.
+    fn two_boxes() -> PolygonMesh {
+        let at = |x: f32| {
+            let bounds = Bounds { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 0.3, 1.0, 1.0) };
+            subdivided_box(bounds, 0.0, [2, 4, 4])
+        };
+        let (mut both, other) = (at(0.0), at(0.5));
+        let first = both.positions.len() as u32;
+        both.positions.extend(other.positions);
+        both.faces.extend(other.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
+        both
     }
 
     /// A threshold need not drop any weight, so the estimate must hold for all weights.

@@ -1,5 +1,6 @@
 //! Binding: computes weights from a mesh and a cage, through every stage.
 
+pub mod fineness;
 mod many;
 mod memory;
 mod offsets;
@@ -10,6 +11,7 @@ mod solving;
 mod voxels;
 mod watch;
 
+pub use fineness::GridChoice;
 pub use many::SolvedCage;
 pub use memory::weights_bytes;
 pub use outside::Misfit;
@@ -21,6 +23,7 @@ use thiserror::Error;
 use crate::controls::Controls;
 use crate::deform::OutsideVertex;
 use crate::frames::Frames;
+use crate::narrow::NarrowPlaces;
 use crate::options::{BindOptions, RangeError};
 use crate::progress::{Cancellation, Progress};
 use crate::report::BindReport;
@@ -139,9 +142,29 @@ pub fn estimate_memory<'a>(
 ) -> Result<u64, BindError> {
     options.check()?;
     let controls = controls.into();
-    let grid = voxels::Voxelization::grid(controls.surface(), options);
     let vertices = points::VertexCounts { rows: n_points, points: n_points };
-    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
+    let estimate = |options: &BindOptions| {
+        let grid = voxels::Voxelization::grid(controls.surface(), options);
+        memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes
+    };
+    let fits = |options: &BindOptions| estimate(options) <= options.memory_limit;
+    let grid = fineness::choose(options, &NarrowPlaces::new(controls), fits).cells;
+    Ok(estimate(&BindOptions { grid, ..*options }))
+}
+
+/// Chooses the grid of a bind, as [`bind`] does if memory suffices: the number of the options, or with
+/// [`AUTO_GRID`](crate::options::AUTO_GRID) the coarsest of [`fineness::AUTO_GRIDS`] in which the narrowest part and gap of
+/// the cage are four cells wide.
+///
+/// # Errors
+/// [`BindError::Option`] if an option is out of range.
+pub fn choose_grid<'a>(
+    controls: impl Into<Controls<'a>>,
+    options: &BindOptions,
+) -> Result<GridChoice, BindError> {
+    options.check()?;
+    let controls = controls.into();
+    Ok(fineness::choose(options, &NarrowPlaces::new(controls), |_| true))
 }
 
 /// Estimates the work of a solve: the number of updates of single values, which is unknowns times columns times sweeps.
@@ -153,8 +176,8 @@ pub fn estimate_updates<'a>(
     controls: impl Into<Controls<'a>>,
     options: &BindOptions,
 ) -> Result<f64, BindError> {
-    options.check()?;
     let controls = controls.into();
-    let grid = voxels::Voxelization::grid(controls.surface(), options);
-    Ok(memory::updates(controls, &grid, options))
+    let options = BindOptions { grid: choose_grid(controls, options)?.cells, ..*options };
+    let grid = voxels::Voxelization::grid(controls.surface(), &options);
+    Ok(memory::updates(controls, &grid, &options))
 }

@@ -15,6 +15,7 @@ use crate::deform::{OutsideVertex, outside_in_words};
 use crate::frames::Frames;
 use crate::grid::Grid;
 use crate::mesh::Weld;
+use crate::narrow::NarrowPlaces;
 use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, ProgressEvent, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
@@ -24,6 +25,7 @@ use crate::team::{Team, VERTEX_RUN};
 use crate::weights::Weights;
 use crate::words::counted;
 
+use super::fineness::{self, GridChoice};
 use super::memory::{estimate, needs_all};
 use super::offsets::{JointPoints, Offsets};
 use super::outside::{oversized, refuse_outside};
@@ -51,12 +53,38 @@ pub enum FieldStorage {
 pub struct PreparedBind<'a> {
     mesh: WeldedPoints<'a>,
     controls: Controls<'a>,
-    options: &'a BindOptions,
+    options: BindOptions,
+    fineness: Fineness,
     pub(super) voxelized: Arc<VoxelizedCage>,
     stencils: Stencils,
     estimated: u64,
     /// Times on the watch's clock, in milliseconds: start, end of voxelization, end of the stencils.
     times_ms: [f64; 3],
+}
+
+/// Choice of the grid, and notices about places that it does not resolve.
+#[derive(Clone, Debug)]
+pub(super) struct Fineness {
+    pub(super) choice: GridChoice,
+    unresolved: Option<String>,
+}
+
+impl Fineness {
+    /// Chooses the grid of the options. `fits`: whether a bind with these options stays within the memory limit.
+    pub(super) fn new(
+        controls: Controls<'_>,
+        options: &BindOptions,
+        fits: impl Fn(&BindOptions) -> bool,
+    ) -> Self {
+        let places = NarrowPlaces::new(controls);
+        let choice = fineness::choose(options, &places, fits);
+        // Classic cells count wherever the cage touches them, so no part is too thin.
+        let unresolved = match options.method {
+            Method::Classic => None,
+            Method::Embedded => places.unresolved(choice.cells).map(|places| places.to_string()),
+        };
+        Self { choice, unresolved }
+    }
 }
 
 pub(super) fn run(
@@ -79,7 +107,7 @@ impl<'a> PreparedBind<'a> {
     pub fn new(
         positions: &'a [Vec3],
         controls: Controls<'a>,
-        options: &'a BindOptions,
+        options: &BindOptions,
         fields: FieldStorage,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
@@ -88,12 +116,19 @@ impl<'a> PreparedBind<'a> {
         let mesh = WeldedPoints::new(positions)?;
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
-        let grid = Voxelization::grid(controls.surface(), options);
         let field_threads = if fields == FieldStorage::Host { team.n_threads() } else { 0 };
-        let needed = estimate(controls, &grid, mesh.count(), field_threads, options);
+        let needed = |options: &BindOptions| {
+            let grid = Voxelization::grid(controls.surface(), options);
+            estimate(controls, &grid, mesh.count(), field_threads, options)
+        };
+        let fits = |options: &BindOptions| needed(options).bytes <= options.memory_limit;
+        let fineness = Fineness::new(controls, options, fits);
+        let options = BindOptions { grid: fineness.choice.cells, ..*options };
+        let needed = needed(&options);
         needed.check(mesh.count(), controls.n_controls(), options.memory_limit)?;
-        let voxelized = Arc::new(VoxelizedCage::new(controls, grid, options, team, watch)?);
-        Self::in_grid(mesh, controls, options, voxelized, needed.bytes, began, watch)
+        let grid = Voxelization::grid(controls.surface(), &options);
+        let voxelized = Arc::new(VoxelizedCage::new(controls, grid, &options, team, watch)?);
+        Self::in_grid(mesh, controls, (options, fineness), voxelized, needed.bytes, began, watch)
     }
 
     /// Computes the stencils in a grid that is already voxelized. `estimated`: memory, bytes; `began`: start on the
@@ -101,7 +136,7 @@ impl<'a> PreparedBind<'a> {
     pub(super) fn in_grid(
         mesh: WeldedPoints<'a>,
         controls: Controls<'a>,
-        options: &'a BindOptions,
+        (options, fineness): (BindOptions, Fineness),
         voxelized: Arc<VoxelizedCage>,
         estimated: u64,
         began: f64,
@@ -109,9 +144,9 @@ impl<'a> PreparedBind<'a> {
     ) -> Result<Self, BindError> {
         let voxelized_ms = watch.now_ms();
         let stencils = sampling_stencils(controls, &voxelized, &mesh.points, options.outside, watch)?;
-        refuse_outside(controls, &mesh, &stencils, options)?;
+        refuse_outside(controls, &mesh, &stencils, &options)?;
         let times_ms = [began, voxelized_ms, watch.now_ms()];
-        Ok(Self { mesh, controls, options, voxelized, stencils, estimated, times_ms })
+        Ok(Self { mesh, controls, options, fineness, voxelized, stencils, estimated, times_ms })
     }
 
     /// The discrete problem on all levels.
@@ -127,7 +162,7 @@ impl<'a> PreparedBind<'a> {
     }
 
     fn solve(&self, watch: &Watch<'_>) -> Result<Solution, BindError> {
-        Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.voxelized.team, watch)?)
+        Ok(solve_and_sample(self.hierarchy(), &self.stencils, &self.options, &self.voxelized.team, watch)?)
     }
 
     /// Solves and samples all columns in this process, as a fallback if the GPU cannot.
@@ -137,7 +172,7 @@ impl<'a> PreparedBind<'a> {
     pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solution, BindError> {
         let (vertices, threads) = (self.mesh.count(), self.voxelized.team.n_threads());
         let needed =
-            estimate(self.controls, &self.hierarchy().levels[0].grid, vertices, threads, self.options);
+            estimate(self.controls, &self.hierarchy().levels[0].grid, vertices, threads, &self.options);
         needed.check(vertices, self.controls.n_controls(), self.options.memory_limit)?;
         self.estimated = needed.bytes;
         self.solve(watch)
@@ -154,11 +189,11 @@ impl<'a> PreparedBind<'a> {
             threshold: self.options.sparsify,
             preserve_affine: self.options.method == Method::Embedded,
         };
-        let all = needs_all(self.controls, self.options);
+        let all = needs_all(self.controls, &self.options);
         let has_offset = |point| all || self.stencils.is_outside(point);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let (points, team) = (&self.mesh.points, &self.voxelized.team);
-        let joints = bound_joints(self.controls, self.options, watch)?;
+        let joints = bound_joints(self.controls, &self.options, watch)?;
         let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, joints);
         let rows = assemble(self.controls, &mut solved.blocks, points, row_options, has_offset, team);
         drop(std::mem::take(&mut solved.blocks));
@@ -176,7 +211,14 @@ impl<'a> PreparedBind<'a> {
         sampled: f64,
         watch: &Watch<'_>,
     ) -> Result<Binding, BindError> {
-        let Self { mesh: WeldedPoints { positions, welded, points }, controls, options, stencils, .. } = self;
+        let Self {
+            mesh: WeldedPoints { positions, welded, points },
+            controls,
+            options,
+            fineness,
+            stencils,
+            ..
+        } = self;
         let VoxelizedCage { team, voxels } = &*self.voxelized;
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
@@ -196,7 +238,7 @@ impl<'a> PreparedBind<'a> {
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
         let mut notices = crossing::notices(controls.cage());
-        notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
+        notices.extend(team.notice(options.threads).into_iter().chain(fineness.unresolved));
         notices.extend(notices_of(controls, &level.grid, options.grid));
         let (outside, held_vertices) = outside_of(&stencils.outside, &welded, n_vertices);
         let vertices = &positions[..n_vertices];
@@ -213,6 +255,7 @@ impl<'a> PreparedBind<'a> {
             adapter: solved.adapter,
             threads: team.n_threads(),
             grid: options.grid,
+            grid_reason: fineness.choice.reason,
             dims: level.grid.dims,
             cell_size: level.grid.cell.as_vec3().to_array(),
             cell_shape: options.cell_shape,

@@ -97,7 +97,7 @@ fn solve_batches<T: Send>(
     let (spent, bytes) = (SolveTimes::default(), AtomicU64::new(0));
     let solved: Vec<Option<(SolveReport, T)>> = team.share(
         n_batches,
-        || batch_solver(hierarchy, options),
+        || batch_solver(hierarchy, options, team.n_threads().min(n_batches)),
         |solver, batch| {
             // The first progress report of a batch comes after the most expensive part of its solve, so poll for
             // cancellation first.
@@ -131,14 +131,20 @@ fn solve_batches<T: Send>(
     Ok((taken, solved))
 }
 
-fn batch_solver(hierarchy: &Hierarchy, options: &BindOptions) -> Box<dyn BatchSolver> {
+/// `threads`: number of threads that have a solver.
+fn batch_solver(hierarchy: &Hierarchy, options: &BindOptions, threads: usize) -> Box<dyn BatchSolver> {
     match options.solver {
         Solver::ConjugateGradient => {
             let v_cycle = options.preconditioner == Preconditioner::VCycle;
             let preconditioner = v_cycle.then(|| Box::new(Workspace::new(hierarchy)) as _);
             Box::new(ConjugateGradient::new(hierarchy, preconditioner))
         }
-        Solver::Multigrid | Solver::Jacobi => Box::new(Workspace::new(hierarchy)),
+        Solver::Multigrid | Solver::Jacobi => {
+            let workspace = Workspace::new(hierarchy);
+            let with_fallback = workspace.bytes() + ConjugateGradient::bytes_of(hierarchy);
+            let needed = options.held + (hierarchy.bytes() + threads * with_fallback) as u64;
+            Box::new(if needed <= options.memory_limit { workspace } else { workspace.without_fallback() })
+        }
     }
 }
 

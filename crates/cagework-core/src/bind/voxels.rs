@@ -27,8 +27,6 @@ pub(super) struct Voxelization {
     pub(super) counts: CellCounts,
     /// Number of cells that lines along different axes classify differently.
     pub(super) ambiguous: u64,
-    /// Notices about the cage in this grid.
-    pub(super) notices: Vec<String>,
     overlaps: Overlaps,
     /// Peak memory, bytes.
     pub(super) bytes: usize,
@@ -106,15 +104,7 @@ impl Voxelization {
         let bytes = hierarchy.bytes()
             + size_of_val(cells.kinds.as_slice())
             + 4 * (values.cells.len() + values.indptr.len() + 2 * values.values.len());
-        Self {
-            hierarchy,
-            counts,
-            ambiguous: 0,
-            notices: Vec::new(),
-            overlaps: Overlaps::default(),
-            bytes,
-            classic: Some(cells),
-        }
+        Self { hierarchy, counts, ambiguous: 0, overlaps: Overlaps::default(), bytes, classic: Some(cells) }
     }
 
     fn embedded(controls: Controls<'_>, grid: Grid, options: &BindOptions) -> Self {
@@ -132,7 +122,6 @@ impl Voxelization {
             hierarchy,
             counts,
             ambiguous: embedding.ambiguous,
-            notices: embedding.notices(controls, options.grid),
             overlaps: embedding.overlaps(),
             bytes,
             classic: None,

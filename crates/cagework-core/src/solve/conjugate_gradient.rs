@@ -66,6 +66,12 @@ impl ConjugateGradient {
         }
     }
 
+    /// Size of the fields of conjugate gradients without a preconditioner, bytes.
+    #[must_use]
+    pub fn bytes_of(hierarchy: &Hierarchy) -> usize {
+        5 * hierarchy.levels[0].n_rows() * size_of::<Row>()
+    }
+
     /// Continues from `u`, the latest iterate of V-cycles that stalled, and stores the solution in `u`. `rhs`: one row
     /// per cut cell; `report`: the report of the cycles, which count towards the limit on iterations.
     pub(super) fn resume(

@@ -65,6 +65,8 @@ pub struct Workspace {
     residual: Vec<Row>,
     /// Whether `f[0]` has one row per cell.
     is_finest_dense: bool,
+    /// Whether conjugate gradients may continue a solve whose cycles stall.
+    may_fall_back: bool,
     /// Conjugate gradients for stalled cycles, allocated on demand.
     fallback: Option<Box<ConjugateGradient>>,
 }
@@ -82,8 +84,16 @@ impl Workspace {
             f,
             residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
             is_finest_dense: false,
+            may_fall_back: true,
             fallback: None,
         }
+    }
+
+    /// Disallows the conjugate gradients that would continue a solve whose cycles stall, and which need another five
+    /// fields. Such a solve ends at the limit on cycles.
+    #[must_use]
+    pub fn without_fallback(self) -> Self {
+        Self { may_fall_back: false, ..self }
     }
 
     /// Runs one red-black sweep of the finest level, the unit in which benchmarks measure the cost of a solve. Call
@@ -198,7 +208,7 @@ impl BatchSolver for Workspace {
             if !cycle_done(cycle, delta) {
                 return None;
             }
-            let stalls = !done && convergence.stalls();
+            let stalls = !done && self.may_fall_back && convergence.stalls();
             if done || stalls {
                 self.up(hierarchy, 0, UP_PASSES);
             }
@@ -213,7 +223,7 @@ impl BatchSolver for Workspace {
                 return report;
             }
             if done {
-                return Some(convergence.into_report());
+                return Some(SolveReport { stalled: false, ..convergence.into_report() });
             }
             start = match coarsest {
                 0 => DOWN_PASSES,

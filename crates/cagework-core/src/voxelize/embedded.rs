@@ -15,7 +15,6 @@ use crate::grid::Grid;
 use crate::levels::{Boundary, coarsened_until_few};
 
 use super::lines::{Hit, Lines, Overlaps};
-use super::resolution;
 
 /// Shortest arm, in cells. A centre this close to the cage has the cage's value within the solver's accuracy, and
 /// shorter arms would cost f32 precision (measured on the Armadillo and the horse).
@@ -61,13 +60,6 @@ impl Embedding {
     #[must_use]
     pub fn boundaries<'a>(&'a self, controls: Controls<'a>) -> Vec<EmbeddedCells<'a>> {
         self.levels.iter().map(|cells| cells.with(controls, &self.lines)).collect()
-    }
-
-    /// Notices about the cage in this grid. `cells`: number of cells along the cage's longest side.
-    #[must_use]
-    pub fn notices(&self, controls: Controls<'_>, cells: u32) -> Vec<String> {
-        let grid = &self.levels[0].grid;
-        resolution::notice(controls, grid, &self.lines, cells).into_iter().collect()
     }
 
     /// Overlaps of parts of the cage. Only walls of the union of all parts bound the interior.

@@ -37,8 +37,6 @@ pub struct Lines {
     start: Vec<u32>,
     hits: Vec<Hit>,
     overlaps: Overlaps,
-    /// Whether any of the lines meets each face. `[n_faces]`
-    met: Vec<bool>,
 }
 
 /// Bounding box of all walls inside other parts of the cage, in cells, as found along grid lines. Empty, with infinite
@@ -102,9 +100,7 @@ impl Lines {
         for line in start.windows(2) {
             hits[line[0] as usize..line[1] as usize].sort_by(|a, b| a.t.total_cmp(&b.t));
         }
-        let mut met = vec![false; cage.faces().len()];
-        hits.iter().for_each(|hit| met[cage.face_of_facet()[hit.triangle as usize] as usize] = true);
-        let mut lines = Self { axis, n_u, start, hits, overlaps: Overlaps::default(), met };
+        let mut lines = Self { axis, n_u, start, hits, overlaps: Overlaps::default() };
         lines.keep_walls(cage, CAGE_TOLERANCE * f64::from(cage.diagonal()) / grid.cell[axis]);
         lines
     }
@@ -154,12 +150,6 @@ impl Lines {
             *end = kept as u32;
         }
         self.hits.truncate(kept);
-    }
-
-    /// Whether any of the lines meets a face of the cage, including faces inside other parts.
-    #[must_use]
-    pub fn meets_face(&self, face: usize) -> bool {
-        self.met[face]
     }
 
     fn range(&self, line: usize) -> Range<usize> {

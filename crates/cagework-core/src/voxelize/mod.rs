@@ -4,6 +4,5 @@ pub mod classic;
 pub mod embedded;
 pub mod lines;
 pub mod published;
-pub mod resolution;
 
 pub use classic::{BoundaryValues, CellKind, ClassicCells, voxelize_classic};

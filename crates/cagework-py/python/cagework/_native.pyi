@@ -14,7 +14,7 @@ _Progress = Callable[[float], object] | None
 _Model = str | PathLike[str] | bytes | bytearray | memoryview
 
 class BindOptions(TypedDict, total=False):
-    grid: int
+    grid: int | Literal["auto"]
     method: Literal["embedded", "classic"]
     solver: Literal["multigrid", "jacobi", "cg"] | None
     preconditioner: Literal["none", "v_cycle"]
@@ -108,7 +108,7 @@ def generate_cage(
     **options: Unpack[CageOptions],
 ) -> Cage: ...
 def check_cage(
-    cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int = 64, smooth: int | None = None
+    cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int | Literal["auto"] = "auto", smooth: int | None = None
 ) -> list[dict[str, Any]]: ...
 def bind(
     points: ArrayLike, cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]

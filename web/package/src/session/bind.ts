@@ -1,5 +1,5 @@
 /**
- * Runs a bind. If the model is not bound yet and the requested grid is finer than `COARSE_GRID`, a coarse pass runs first,
+ * Runs a bind. If the model is not bound yet and the requested grid is automatic or finer than `COARSE_GRID`, a coarse pass runs first,
  * so that the model can soon be dragged. There is no coarse pass above the limit `MAX_COARSE_CELLS`.
  */
 
@@ -95,7 +95,7 @@ export function startBind(start: BindStart): Job<BindReport> {
 
   async function all(): Promise<BindReport> {
     const isLarge = (points * cage().positions.length) / 3 > MAX_COARSE_CELLS;
-    if (!engine.bound && !isLarge && options.grid > COARSE_GRID) await run("coarse");
+    if (!engine.bound && !isLarge && (options.grid === 0 || options.grid > COARSE_GRID)) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }

@@ -1,0 +1,322 @@
+//! Narrow places of a cage: thin parts, gaps between parts, and vertices with small faces.
+//!
+//! A grid resolves a place that is several cells wide. The check of a cage, the notice of a bind and the choice of the
+//! grid measure narrow places in the same way.
+
+use glam::DVec3;
+
+use crate::controls::Controls;
+use crate::geometry::distance_along;
+use crate::options::MAX_GRID;
+use crate::words::counted;
+
+/// Two faces bound a part or a gap, rather than a corner, if the dot product of their normals is at most this: the angle
+/// between them is below 60 degrees.
+const MAX_NORMAL_DOT: f64 = -0.5;
+
+/// Limit on the number of tests of a ray against a triangle. The faces of larger cages are sampled evenly.
+const MAX_TESTS: usize = 4_000_000;
+
+/// Width that a grid resolves, in cells. A thinner part may contain no cell centre, and then has no unknowns.
+const MIN_CELLS: f64 = 1.0;
+
+/// Area of all faces of a vertex that a grid resolves, in cell faces. Fewer than two grid lines meet a smaller area, so the
+/// vertex has little influence on the solution.
+const MIN_VERTEX_AREA: f64 = 1.0;
+
+/// Barycentric coordinates of the points of a triangle from which rays start: the centres of the four triangles into
+/// which its edge midpoints divide it.
+const RAY_ORIGINS: [[f64; 3]; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+
+/// Side of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The part of the cage behind the face.
+    Inside,
+    /// The gap in front of the face.
+    Outside,
+}
+
+/// The space between a face of a cage and the faces opposite to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowPlace {
+    /// Face of the cage.
+    pub face: u32,
+    /// Side of the face.
+    pub side: Side,
+    /// Median distance to the opposite faces, object units.
+    pub width: f64,
+    /// Area of the face, object units squared.
+    pub area: f64,
+    /// Point halfway between the face and an opposite one, object units.
+    pub middle: DVec3,
+}
+
+/// A triangle of the surface: its face of the cage, corners, and normal times twice its area.
+type Triangle = (u32, [DVec3; 3], DVec3);
+
+/// All narrow places of a cage.
+#[derive(Clone, Debug, Default)]
+pub struct NarrowPlaces {
+    /// Narrowest first.
+    places: Vec<NarrowPlace>,
+    /// Area of all faces of each vertex of the cage, object units squared; infinite for a vertex without faces.
+    /// `[n_vertices]`
+    vertex_areas: Vec<f64>,
+    /// Longest side of the cage's box, object units.
+    longest_side: f64,
+}
+
+impl NarrowPlaces {
+    /// Measures the distance from points of each face to the first face that a ray along the normal meets, on both sides.
+    /// Inner walls are ignored.
+    #[must_use]
+    pub fn new(controls: Controls<'_>) -> Self {
+        let surface = controls.surface();
+        let triangles: Vec<Triangle> = (0..)
+            .zip(surface.face_of_triangle())
+            .filter_map(|(triangle, &part)| {
+                let corners @ [a, b, c] = surface.triangle_corners(triangle);
+                Some((controls.cage_face(part)?, corners, (b - a).cross(c - a)))
+            })
+            .collect();
+        let cage = controls.cage();
+        let mut of_face = vec![Vec::new(); cage.faces().len()];
+        for &triangle in &triangles {
+            of_face[triangle.0 as usize].push(triangle);
+        }
+        let area_of = |own: &[Triangle]| own.iter().map(|(.., cross)| 0.5 * cross.length()).sum::<f64>();
+        let mut vertex_areas = vec![f64::INFINITY; cage.n_vertices()];
+        for (face, own) in cage.faces().iter().zip(&of_face) {
+            let area = area_of(own);
+            for &vertex in face {
+                let sum = &mut vertex_areas[vertex as usize];
+                *sum = if sum.is_finite() { *sum + area } else { area };
+            }
+        }
+        let tests = 2 * RAY_ORIGINS.len() * triangles.len() * triangles.len();
+        let step = tests.div_ceil(MAX_TESTS).max(1);
+        let mut places = Vec::new();
+        for (face, own) in (0..).zip(&of_face).step_by(step) {
+            for side in [Side::Inside, Side::Outside] {
+                let mut widths: Vec<(f64, DVec3)> =
+                    own.iter().flat_map(|own| widths(own, side, &triangles)).collect();
+                widths.sort_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some(&(width, middle)) = widths.get(widths.len() / 2)
+                    && width.is_finite()
+                {
+                    places.push(NarrowPlace { face, side, width, area: area_of(own), middle });
+                }
+            }
+        }
+        places.sort_by(|a, b| a.width.total_cmp(&b.width));
+        let longest_side = f64::from(surface.bounds().extent().max_element());
+        Self { places, vertex_areas, longest_side }
+    }
+
+    /// Size of a cell, object units, of a grid with `cells` cells along the cage's longest side.
+    #[must_use]
+    pub fn cell(&self, cells: u32) -> f64 {
+        self.longest_side / f64::from(cells.max(1))
+    }
+
+    /// The narrowest part or gap; `None` if no two faces are opposite.
+    ///
+    /// Faces beside a sharp edge are close together only there. Therefore the areas of the faces are added up from the
+    /// narrowest place on, and the first width whose square is at most the sum counts.
+    #[must_use]
+    pub fn narrowest(&self) -> Option<NarrowPlace> {
+        narrowest(self.places.iter())
+    }
+
+    /// The thinnest part, like [`Self::narrowest`] without gaps.
+    #[must_use]
+    pub fn thinnest(&self) -> Option<NarrowPlace> {
+        narrowest(self.parts())
+    }
+
+    fn parts(&self) -> impl Iterator<Item = &NarrowPlace> {
+        self.places.iter().filter(|place| place.side == Side::Inside)
+    }
+
+    /// The places that a grid does not resolve: parts thinner than a cell, and vertices with faces smaller than a cell.
+    /// `cells`: number of cells along the cage's longest side. `None` if it resolves all.
+    #[must_use]
+    pub fn unresolved(&self, cells: u32) -> Option<Unresolved> {
+        let cell = self.cell(cells);
+        let is_thin = |place: &NarrowPlace| place.width < MIN_CELLS * cell;
+        let thinnest = self.thinnest().filter(is_thin).map(|place| place.width);
+        let parts: Vec<NarrowPlace> =
+            if thinnest.is_some() { self.parts().copied().filter(is_thin).collect() } else { Vec::new() };
+        let vertices: Vec<u32> = (0..)
+            .zip(&self.vertex_areas)
+            .filter_map(|(vertex, &area)| (area < MIN_VERTEX_AREA * cell * cell).then_some(vertex))
+            .collect();
+        let smallest = self.vertex_areas.iter().copied().fold(f64::INFINITY, f64::min);
+        let of_part = thinnest.map_or(0.0, |width| MIN_CELLS * self.longest_side / width);
+        let of_vertex =
+            if vertices.is_empty() { 0.0 } else { self.longest_side * (MIN_VERTEX_AREA / smallest).sqrt() };
+        let wanted = of_part.max(of_vertex).ceil();
+        (wanted > 0.0).then(|| Unresolved {
+            parts,
+            vertices,
+            // Rounding can give the number that is not enough.
+            cells: (wanted <= f64::from(MAX_GRID)).then_some((wanted as u32).max(cells + 1)),
+        })
+    }
+}
+
+/// Places that a grid does not resolve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unresolved {
+    /// Parts thinner than a cell, thinnest first.
+    pub parts: Vec<NarrowPlace>,
+    /// Vertices of the cage with faces smaller than a cell, ascending.
+    pub vertices: Vec<u32>,
+    /// Number of cells along the longest side of a grid that resolves all places; `None` if no grid does.
+    pub cells: Option<u32>,
+}
+
+impl std::fmt::Display for Unresolved {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let places = self.parts.first().map(|thinnest| {
+            let [x, y, z] = thinnest.middle.as_vec3().to_array();
+            let n = counted(self.parts.len(), "face", "faces");
+            format!("the cage is thinner than a cell behind {n}, most at ({x:.3}, {y:.3}, {z:.3})")
+        });
+        let vertices = self.vertices.first().map(|first| match self.vertices.len() {
+            1 => format!("the faces of vertex {first} are smaller than a cell"),
+            n => format!("the faces of {n} vertices (from {first} on) are smaller than a cell"),
+        });
+        let both: Vec<String> = places.into_iter().chain(vertices).collect();
+        let advice = match self.cells {
+            Some(cells) => format!("use a grid of {cells} cells"),
+            None => "no grid is fine enough: make the cage thicker there, or coarser".to_owned(),
+        };
+        let both = both.join(", and ");
+        write!(
+            f,
+            "The grid does not resolve the cage: {both}. Weights there depend on the cage's place in the grid: {advice}."
+        )
+    }
+}
+
+fn narrowest<'a>(mut places: impl Iterator<Item = &'a NarrowPlace>) -> Option<NarrowPlace> {
+    let mut area = 0.0;
+    places
+        .find(|place| {
+            area += place.area;
+            place.width * place.width <= area
+        })
+        .copied()
+}
+
+/// Distances along rays from points of a triangle to the opposite triangle, with the point halfway; infinite where no
+/// triangle is opposite.
+fn widths(own: &Triangle, side: Side, triangles: &[Triangle]) -> [(f64, DVec3); RAY_ORIGINS.len()] {
+    let (_, own_corners, cross) = own;
+    let normal = cross.normalize_or_zero();
+    let way = if side == Side::Inside { -normal } else { normal };
+    RAY_ORIGINS.map(|shares| {
+        let from = (0..3).map(|k| shares[k] * own_corners[k]).sum::<DVec3>();
+        let (mut width, mut facing) = (f64::INFINITY, DVec3::ZERO);
+        for (_, corners, cross) in triangles {
+            // Triangles that touch the ray's own are at distance 0. They bound no part and no gap.
+            if corners != own_corners
+                && let Some(distance) = distance_along(from, way, *corners)
+                && distance > 0.0
+                && distance < width
+            {
+                (width, facing) = (distance, *cross);
+            }
+        }
+        let is_opposite = normal.dot(facing.normalize_or_zero()) <= MAX_NORMAL_DOT;
+        if is_opposite { (width, from + 0.5 * width * way) } else { (f64::INFINITY, from) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::cage::{Cage, subdivided_box};
+    use crate::mesh::{Bounds, PolygonMesh};
+
+    fn boxes(boxes: &[(Vec3, Vec3, [u32; 3])]) -> Cage {
+        let mut all = PolygonMesh::default();
+        for &(min, max, divisions) in boxes {
+            let mesh = subdivided_box(Bounds { min, max }, 0.0, divisions);
+            let first = all.positions.len() as u32;
+            all.positions.extend(mesh.positions);
+            all.faces
+                .extend(mesh.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
+        }
+        Cage::new(&all).unwrap()
+    }
+
+    #[test]
+    fn thickness_and_gap_of_two_plates() {
+        let at = |z: f32, height: f32| (vec3(0.0, 0.0, z), vec3(4.0, 4.0, z + height), [4, 4, 1]);
+        let places = NarrowPlaces::new((&boxes(&[at(0.0, 0.5), at(0.75, 1.0)])).into());
+        let narrowest = places.narrowest().unwrap();
+        assert_eq!((narrowest.side, narrowest.width, narrowest.middle.z), (Side::Outside, 0.25, 0.625));
+        let thinnest = places.thinnest().unwrap();
+        assert_eq!((thinnest.side, thinnest.width, thinnest.middle.z), (Side::Inside, 0.5, 0.25));
+        // A cell of 8 cells along 4 units is as wide as the lower plate is thick.
+        assert_eq!(places.unresolved(8), None);
+        let unresolved = places.unresolved(7).unwrap();
+        assert_eq!((unresolved.parts.len(), unresolved.cells), (32, Some(8)));
+        assert!(unresolved.to_string().contains("behind 32 faces"), "{unresolved}");
+    }
+
+    /// The faces beside the edge of a wedge are close together only there: the narrowest place is as wide as the faces are
+    /// long, whatever their number.
+    #[test]
+    fn sharp_edge_is_not_a_thin_part() {
+        for n in [8, 32] {
+            let slab = subdivided_box(Bounds { min: Vec3::ZERO, max: vec3(8.0, 1.0, 8.0) }, 0.0, [n, 1, 1]);
+            let positions =
+                slab.positions.iter().map(|p| vec3(p.x, p.y * (p.x + 1e-3) / 16.0, p.z)).collect();
+            let cage = Cage::new(&PolygonMesh { positions, ..slab }).unwrap();
+            let places = NarrowPlaces::new((&cage).into());
+            let thinnest = places.thinnest().unwrap().width;
+            assert!(thinnest < 0.5 && thinnest > 0.01, "{n}: {thinnest}");
+        }
+    }
+
+    #[test]
+    fn vertex_with_small_faces_is_not_resolved_by_a_coarse_grid() {
+        let mut mesh = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1, 1, 1]);
+        // A vertex in a corner triangle of the first face, with three faces of together 0.1 * 0.1 / 2.
+        let face = mesh.faces.remove(0);
+        let at = |k: usize| mesh.positions[face[k] as usize];
+        let (a, b, d) = (at(0), at(0).lerp(at(1), 0.1), at(0).lerp(at(3), 0.1));
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([b, d, (a + b + d) / 3.0]);
+        let [b, d, tip] = [first, first + 1, first + 2];
+        mesh.faces.extend([vec![face[0], b, tip], vec![b, d, tip], vec![d, face[0], tip]]);
+        mesh.faces.push(vec![b, face[1], face[2], face[3], d]);
+        let edge = |k: usize, l: usize, new: u32, mesh: &mut PolygonMesh| {
+            for outline in &mut mesh.faces[..5] {
+                let n = outline.len();
+                let at = (0..n).find(|&i| outline[i] == face[l] && outline[(i + 1) % n] == face[k]);
+                if let Some(at) = at {
+                    outline.insert(at + 1, new);
+                }
+            }
+        };
+        edge(0, 1, b, &mut mesh);
+        edge(3, 0, d, &mut mesh);
+        let cage = Cage::new(&mesh).unwrap();
+        let unresolved = NarrowPlaces::new((&cage).into()).unresolved(10).unwrap();
+        // The area of a cell face is 0.01 with 10 cells, and 0.005 with 10 sqrt(2) cells.
+        assert_eq!((unresolved.vertices.as_slice(), unresolved.cells), (&[tip][..], Some(15)));
+        assert!(unresolved.parts.is_empty() && unresolved.to_string().contains("15 cells"), "{unresolved}");
+    }
+}
