@@ -247,7 +247,7 @@ mod tests {
             ("two boxes", &two, None, usual),
             ("conjugate gradients", &cube, None, BindOptions { solver: Solver::ConjugateGradient, ..usual }),
             ("Jacobi", &cube, None, BindOptions { solver: Solver::Jacobi, tau: 1e-2, ..usual }),
-            ("classic", &cube, None, BindOptions { method: Method::Classic, tau: 1e-2, ..usual }),
+            ("classic", &cube, None, BindOptions { grid: 48, method: Method::Classic, tau: 1e-2, ..usual }),
         ];
         for (name, mesh, inner, options) in cases {
             let cage = Cage::new(mesh).unwrap();

@@ -130,8 +130,8 @@ pub fn bind<'a>(
     pipeline::run(positions, controls.into(), options, progress)
 }
 
-/// Estimates the working memory of a bind of `n_points` vertices on the CPU, bytes. Allocates nothing. The actual peak
-/// may be a third lower or higher, and lower still if [`BindOptions::sparsify`] drops most of the weights.
+/// Estimates the working memory of a bind of `n_points` vertices on the CPU, bytes. Allocates nothing. It is within
+/// 15 % of the size of all arrays, unless [`BindOptions::sparsify`] drops most of the weights.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.
