@@ -65,6 +65,21 @@ impl<'a> FaceBoxes<'a> {
             }
         }
     }
+
+    /// Closest points of all facets that are at most `distance` away from `point`, by distance, then by facet.
+    #[must_use]
+    pub fn within(&self, point: DVec3, distance: f64) -> Vec<ClosestPoint> {
+        let near =
+            self.faces.iter().filter(|(_, [low, high])| point.distance(point.clamp(*low, *high)) <= distance);
+        let closest = |facet: u32| {
+            let closest = closest_point_on_triangle(point, self.cage.facet_corners(facet));
+            ClosestPoint { facet, barycentric: closest.barycentric, distance: closest.point.distance(point) }
+        };
+        let facets = near.flat_map(|(facets, _)| facets.clone());
+        let mut found: Vec<_> = facets.map(closest).filter(|found| found.distance <= distance).collect();
+        found.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.facet.cmp(&b.facet)));
+        found
+    }
 }
 
 /// Computes the distance of each point from the closest triangle of a mesh, object units; infinite without triangles.

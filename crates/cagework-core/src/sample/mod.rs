@@ -15,16 +15,12 @@ use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
-/// A vertex outside the cage, or inside a ball or tube, with its closest point on the surface of the controls.
+/// A vertex outside the cage, or inside a ball or tube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsidePoint {
     /// Index of the vertex in the mesh.
     pub vertex: u32,
-    /// Facet of the surface with the closest point.
-    pub triangle: u32,
-    /// Barycentric coordinates of the closest point in `triangle`.
-    pub barycentric: [f64; 3],
-    /// Distance of the vertex from the closest point, object units.
+    /// Distance of the vertex from the surface of the controls, object units.
     pub distance: f64,
     /// Whether the vertex is inside a ball or tube, rather than outside the cage.
     pub is_held: bool,
