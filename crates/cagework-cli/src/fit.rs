@@ -93,6 +93,9 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
         });
     }
     write_pose(&bound.model, &bound.cage, &pose, args)?;
+    let unsettled = (!fitted.is_settled).then(|| {
+        format!("The fit did not converge within {} steps: the pose is that of the last one.", fitted.steps)
+    });
 
     let size = Bounds::of(&bound.model.positions).map_or(1.0, |b| f64::from(b.diagonal()));
     let before = deform_bound(&weights, &bound.frames, bound.cage.controls().rest());
@@ -113,7 +116,7 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
         settled: fitted.is_settled,
         precompute_ms,
         fit_ms,
-        notices: bound.model.notices.into_iter().chain(notices).collect(),
+        notices: bound.model.notices.into_iter().chain(notices).chain(unsettled).collect(),
     };
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
@@ -177,9 +180,6 @@ fn text(summary: &FitSummary) -> String {
         summary.energy,
         shown(&summary.output)
     );
-    if !summary.settled {
-        out += &format!("note: the fit did not converge within {} steps\n", summary.steps);
-    }
     for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }

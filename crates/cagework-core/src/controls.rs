@@ -10,7 +10,7 @@ mod inner;
 mod set;
 mod shapes;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::weights::Weights;
@@ -120,6 +120,20 @@ impl<'a> Controls<'a> {
     #[must_use]
     pub fn cage_face(&self, face: u32) -> Option<u32> {
         self.origins.map_or(Some(face), |origins| origins[face as usize])
+    }
+
+    /// Center of the ball to which a facet of the surface belongs, object units.
+    pub(crate) fn ball_center(&self, facet: u32) -> Option<DVec3> {
+        let inner = self
+            .inner()
+            .filter(|_| self.cage_face(self.surface.face_of_facet()[facet as usize]).is_none())?;
+        let mut control = None;
+        // All corners of a ball have the value 1 of its control.
+        self.values_at(facet, [1.0, 0.0, 0.0], &mut |column, value| {
+            control = (value == 1.0).then_some(column).or(control);
+        });
+        let ball = control?.checked_sub(self.cage.n_vertices() as u32)?;
+        inner.balls().any(|b| b == ball).then(|| inner.positions[ball as usize].as_dvec3())
     }
 
     /// Computes the Dirichlet values at a point of the surface, given by one of the surface's facets (`triangle`, see

@@ -130,6 +130,6 @@ fn invalid_inner_controls_are_rejected() {
     sandbox
         .run("bind mesh.obj --cage cage.obj -g 16 --controls spine.obj --radius 0.05")
         .success()
-        .stdout(contains("The radius of the controls inside, 5.000e-2, is below a cell of this grid"));
+        .stdout(contains("The radius of the controls inside, 5.000e-2, is below two cells of this grid"));
     sandbox.run("bind mesh.obj --cage cage.obj --radius 0.1").code(2);
 }

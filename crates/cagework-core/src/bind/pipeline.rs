@@ -388,16 +388,20 @@ fn outside_of(points: &[OutsidePoint], welded: &Weld, n_vertices: usize) -> (Vec
 /// cage.
 const MIN_RADIUS_SHARE: f64 = 1e-3;
 
+/// Radii from this share of two cells on have no notice, so that rounding does not give the default radius one in the
+/// default grid, where it is two cells.
+const MIN_CELLS_SHARE: f32 = 0.999;
+
 /// Returns notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side,
 /// balls and tubes that reach through the cage, and vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let (Some(inner), Some(radius)) = (controls.inner(), controls.inner_radius()) else { return Vec::new() };
     let mut notices = Vec::new();
-    let cell = grid.cell.max_element() as f32;
-    if inner.has_radius() && radius < cell {
-        let finer = (f64::from(cells) * f64::from(cell / radius)).ceil();
+    let two_cells = 2.0 * grid.cell.max_element() as f32;
+    if inner.has_radius() && radius < MIN_CELLS_SHARE * two_cells {
+        let finer = (f64::from(cells) * f64::from(MIN_CELLS_SHARE * two_cells / radius)).ceil();
         notices.push(format!(
-            "The radius of the controls inside, {radius:.3e}, is below a cell of this grid, {cell:.3e}: their reach depends on \
+            "The radius of the controls inside, {radius:.3e}, is below two cells of this grid, {two_cells:.3e}: their reach depends on \
              their position in the grid. Use a grid of {finer} cells, or a larger radius."
         ));
     }

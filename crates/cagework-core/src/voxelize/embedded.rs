@@ -9,6 +9,8 @@
 //!
 //! Source: Joshi et al. 2007, section 4, for the grid; Gibou et al. 2002 for the stencil with cut arms.
 
+use glam::DVec3;
+
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::grid::Grid;
@@ -19,6 +21,10 @@ use super::lines::{Hit, Lines, Overlaps};
 /// Shortest arm, in cells. A centre this close to the cage has the cage's value within the solver's accuracy, and
 /// shorter arms would cost f32 precision (measured on the Armadillo and the horse).
 const MIN_ARM: f64 = 1e-3;
+
+/// Limits on the factor of arms that end on a ball. Values beyond occur on levels whose cells are larger than the ball,
+/// and at centres so close to the ball that its mesh differs from the sphere by more.
+const BALL_SCALE_RANGE: [f64; 2] = [0.5, 2.0];
 
 /// Classification of a level's cells. Level k uses every 2^k-th centre of the finest grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -201,6 +207,31 @@ impl EmbeddedCells<'_> {
         };
         hit.map(|h| (*h, (h.t / step - s).abs())).filter(|(_, theta)| *theta <= 1.0)
     }
+
+    /// Factor of the arms of a cell that end on the ball around `center`, with which the cell's equation is exact for
+    /// `1/r`, where r is the distance from the center. Without it, a ball acts like one that is smaller by 2 % if its
+    /// radius is two cells.
+    fn ball_scale(&self, cell: [u32; 3], center: DVec3) -> f64 {
+        let grid = &self.cells.grid;
+        let radius = self.controls.inner_radius().map_or(0.0, f64::from);
+        let potential = |p: DVec3| 1.0 / p.distance(center).max(radius);
+        let at = grid.center(cell);
+        let (mut of_ball, mut of_others) = (0.0, 0.0);
+        for direction in 0..6 {
+            let way = DVec3::AXES[direction / 2] * grid.cell * if direction % 2 == 0 { 1.0 } else { -1.0 };
+            match self.nearest(cell, direction) {
+                Some((hit, theta)) if self.controls.ball_center(hit.triangle) == Some(center) => {
+                    of_ball += (1.0 / radius - potential(at)) / arm_length(theta);
+                }
+                Some((_, theta)) => {
+                    of_others += (potential(at + theta * way) - potential(at)) / arm_length(theta);
+                }
+                None => of_others += potential(at + way) - potential(at),
+            }
+        }
+        let [low, high] = BALL_SCALE_RANGE;
+        if of_ball > 0.0 { (-of_others / of_ball).clamp(low, high) } else { 1.0 }
+    }
 }
 
 /// The two centres next to a crossing at `t`. A centre exactly at the crossing counts as above it, as in [`votes`],
@@ -227,7 +258,13 @@ impl Boundary for EmbeddedCells<'_> {
         let Some((hit, theta)) = self.nearest(cell, direction) else { return 0.0 };
         let [b0, b1] = hit.barycentric;
         self.controls.values_at(hit.triangle, [b0, b1, 1.0 - b0 - b1], hats);
-        // A comparison instead of `max`, which has no single wasm instruction.
-        1.0 / if theta > MIN_ARM { theta } else { MIN_ARM }
+        let scale = self.controls.ball_center(hit.triangle).map_or(1.0, |ball| self.ball_scale(cell, ball));
+        scale / arm_length(theta)
     }
+}
+
+/// Length of an arm, in cells, that ends on the cage at a distance of `theta`. A comparison instead of `max`, which has
+/// no single wasm instruction.
+fn arm_length(theta: f64) -> f64 {
+    if theta > MIN_ARM { theta } else { MIN_ARM }
 }
