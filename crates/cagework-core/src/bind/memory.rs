@@ -11,7 +11,6 @@ use glam::DVec3;
 
 use super::BindError;
 use super::points::VertexCounts;
-use crate::cage::Cage;
 use crate::controls::{Controls, InnerControls};
 use crate::grid::Grid;
 
@@ -191,7 +190,7 @@ mod tests {
     use super::*;
     use crate::bind::bind;
     use crate::bind::voxels::Voxelization;
-    use crate::cage::subdivided_box;
+    use crate::cage::{Cage, subdivided_box};
     use crate::controls::{ControlSet, InnerElement};
     use crate::mesh::PolygonMesh;
     use crate::progress::NoProgress;
