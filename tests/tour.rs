@@ -133,6 +133,7 @@ fn smooth_cage_avoids_sharp_folds() {
     };
     let (plain, smooth) = (folds(0), folds(2));
     assert!(smooth < 0.8 * plain, "{smooth} {plain}");
+    assert!((plain / 0.0487 - 1.0).abs() < 0.02, "{plain}");
 }
 
 /// Finds the 99.9th percentile over all edges of the increase of the dihedral angle from rest, radians.

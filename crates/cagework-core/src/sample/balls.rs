@@ -62,7 +62,8 @@ impl<'a> Balls<'a> {
         if self.balls.is_empty() {
             return;
         }
-        self.blocks.near(low, |index| {
+        let low = DVec3::from_array(low.map(f64::from));
+        self.blocks.near(low, low + 1.0, |index| {
             if found.iter().all(|ball| ball.index != index) {
                 found.push(NearBall { index, sum: 0.0, of_nodes: 0.0 });
             }

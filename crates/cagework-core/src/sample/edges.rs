@@ -60,7 +60,7 @@ pub(super) struct Passage {
 }
 
 /// Smoothstep from 1 at 0 to 0 at 1.
-fn fade(x: f64) -> f64 {
+pub(super) fn fade(x: f64) -> f64 {
     if x < 1.0 { 1.0 - x * x * (3.0 - 2.0 * x) } else { 0.0 }
 }
 
@@ -103,8 +103,9 @@ impl EdgeLists {
         if self.edges.is_empty() {
             return;
         }
-        let middle = DVec3::from_array(low.map(|x| f64::from(x) + 0.5));
-        self.blocks.near(low, |number| {
+        let low = DVec3::from_array(low.map(f64::from));
+        let middle = low + 0.5;
+        self.blocks.near(low, low + 1.0, |number| {
             let [a, b] = self.edges[number as usize].ends;
             let (way, to) = (b - a, middle - a);
             let s = (to.dot(way) / way.length_squared()).clamp(0.0, 1.0);

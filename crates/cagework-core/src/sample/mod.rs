@@ -8,6 +8,8 @@ pub mod classic;
 mod edges;
 pub mod embedded;
 mod outside;
+#[cfg(test)]
+mod tests;
 pub mod triangles;
 
 use crate::cage::CAGE_TOLERANCE;

@@ -70,14 +70,11 @@ impl Blocks {
         ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
     }
 
-    /// Calls `found` for every box that may meet the cube between centre `low` and centre `low + 1`. May call it
-    /// several times for the same box.
+    /// Calls `found` for every box that may meet the box between `low` and `high`. May call it several times for the
+    /// same box.
     #[inline]
-    pub fn near(&self, low: [u32; 3], mut found: impl FnMut(u32)) {
-        // The cube may extend beyond the block's upper side by a cell: visit the blocks of its lowest and highest
-        // corners, which together list every box that meets the cube.
-        let first = low.map(|x| x / BLOCK);
-        let last = low.map(|x| (x + 1) / BLOCK);
+    pub fn near(&self, low: DVec3, high: DVec3, mut found: impl FnMut(u32)) {
+        let [first, last] = [low, high].map(|at| at.to_array().map(|x| x.max(0.0) as u32 / BLOCK));
         for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
             for y in first[1]..=last[1].min(self.n_blocks[1] - 1) {
                 for x in first[0]..=last[0].min(self.n_blocks[0] - 1) {
@@ -127,24 +124,20 @@ impl TriangleLists {
         Self { triangles, blocks }
     }
 
-    /// Triangles that may meet the cube between centre `low` and centre `low + 1`: all that do, and possibly some
-    /// others.
-    pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
+    /// Triangles that may meet the box between `low` and `high`: all that do, and possibly some others.
+    pub fn in_box(&self, low: DVec3, high: DVec3, found: &mut Vec<u32>) {
         found.clear();
-        let cube_low = DVec3::from_array(low.map(f64::from));
-        let cube_high = cube_low + 1.0;
-        let middle = cube_low + 0.5;
-        self.blocks.near(low, |number| {
-            let t = &self.triangles[number as usize];
-            if t.low.cmple(cube_high).all()
-                && t.high.cmpge(cube_low).all()
-                && (middle - t.corners[0]).dot(t.normal).abs()
-                    <= 0.5 * t.normal.abs().element_sum() * (1.0 + TOLERANCE) + TOLERANCE
-                && !found.contains(&number)
-            {
+        self.blocks.near(low, high, |number| {
+            if self.triangle(number).meets(low, high) && !found.contains(&number) {
                 found.push(number);
             }
         });
+    }
+
+    /// Triangles that may meet the cube between centre `low` and centre `low + 1`.
+    pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
+        let low = DVec3::from_array(low.map(f64::from));
+        self.in_box(low, low + 1.0, found);
     }
 
     /// All triangles, in the order of the cage's facets.
@@ -190,6 +183,45 @@ impl CellTriangle {
     pub fn is_near_plane(&self, p: DVec3, reach: f64) -> bool {
         let height = (p - self.corners[0]).dot(self.normal);
         height * height <= reach * reach * self.normal.length_squared()
+    }
+
+    /// Whether the triangle may meet the box between `low` and `high`. If not, it does not meet it.
+    #[inline]
+    #[must_use]
+    pub fn meets(&self, low: DVec3, high: DVec3) -> bool {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        self.low.cmple(high).all()
+            && self.high.cmpge(low).all()
+            && (middle - self.corners[0]).dot(self.normal).abs()
+                <= self.normal.abs().dot(half) * (1.0 + TOLERANCE) + TOLERANCE
+    }
+
+    /// Distance from `p` in the maximum norm: half the side of the smallest cube around `p` that meets the triangle.
+    ///
+    /// A cube meets a triangle unless a plane separates them that is parallel to a side of the cube, to the triangle, or
+    /// to an edge of each. The cube of half side s reaches s times the sum of |n| along a direction n.
+    #[must_use]
+    pub fn max_norm_distance(&self, p: DVec3) -> f64 {
+        let mut distance = (self.low - p).max(p - self.high).max_element().max(0.0);
+        // Along a normal that reaches `reach` cells, the triangle extends from `low` to `high`.
+        let mut separate = |low: f64, high: f64, reach: f64| {
+            let apart = low.max(-high);
+            if apart > distance * reach {
+                distance = apart / reach;
+            }
+        };
+        let height = self.normal.dot(self.corners[0] - p);
+        separate(height, height, self.normal.abs().element_sum());
+        let corners = self.corners.map(|corner| (corner - p).to_array());
+        for k in 0..3 {
+            let [a, b, c] = [0, 1, 2].map(|step| corners[(k + step) % 3]);
+            for (u, v) in [(0, 1), (1, 2), (2, 0)] {
+                let edge = [b[u] - a[u], b[v] - a[v]];
+                let [s, t] = [a, c].map(|q| edge[0] * q[v] - edge[1] * q[u]);
+                separate(s.min(t), s.max(t), edge[0].abs() + edge[1].abs());
+            }
+        }
+        distance
     }
 
     /// Intersection of the line through `p` along `axis` with the triangle, including its boundary.
