@@ -115,6 +115,17 @@ impl EdgeLists {
         });
     }
 
+    /// Distance, in cells and at most `limit`, from `p` to the nearest of the edges with the indices `some`.
+    pub(super) fn distance(&self, some: &[u32], p: DVec3, limit: f64) -> f64 {
+        let squared = some.iter().map(|&number| {
+            let [a, b] = self.edges[number as usize].ends;
+            let (way, to) = (b - a, p - a);
+            let s = (to.dot(way) / way.length_squared()).clamp(0.0, 1.0);
+            (to - s * way).length_squared()
+        });
+        squared.fold(limit * limit, f64::min).sqrt()
+    }
+
     /// Passages of a ray from `p` along `axis` by the edges with the indices `some`, nearest first. `up`: whether the
     /// ray points up the axis; `end`: distance at which the ray ends. If it does not end at a wall, edges beyond its
     /// end also count, with a share that decreases with their distance from the end.

@@ -6,8 +6,8 @@
 //! third, whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the
 //! result is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even
 //! if no centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the
-//! axes are averaged. Rays next to re-entrant edges are split, see `edges.rs`; stencils beside balls are corrected, see
-//! `balls.rs`.
+//! axes are averaged; right beside a wall, those count that meet it first. Rays next to re-entrant edges are split, see
+//! `edges.rs`; stencils beside balls are corrected, see `balls.rs`.
 //!
 //! The result is continuous, but its gradient jumps at cube faces. Away from the cage, the centres are therefore
 //! interpolated by the uniform quadratic B-spline, whose gradient is continuous. Nearer the cage, one blends into the
@@ -39,6 +39,13 @@ const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 /// B-spline, and from which on the B-spline is used alone. At the first one, all 27 centres of the B-spline are inside
 /// the cage, and no wall is between them.
 const BLEND: [f64; 2] = [1.5, 2.0];
+
+/// Distance, in cells, up to which walls change the shares of the orders of the axes. With 1/2, weights on generated cages
+/// are less accurate.
+const WALL_RANGE: f64 = 0.25;
+
+/// Smallest distance of a wall, in cells, that is compared with those along other axes.
+const MIN_WALL_DISTANCE: f64 = 1e-9;
 
 /// If the total weight of ray ends outside the cage lies between this and 1 minus this, the winding number decides
 /// whether a vertex is outside. Rounding next to edges also causes such ends.
@@ -196,8 +203,9 @@ impl<'a> Sampler<'a> {
                 .values_at(triangle, barycentric, &mut |column, value| stencil.add_hat(column, value));
             return true;
         } else {
-            for order in ORDERS {
-                let weight = (1.0 - of_spline) / ORDERS.len() as f64;
+            let shares = self.shares(p, scratch);
+            for (order, share) in ORDERS.into_iter().zip(shares).filter(|&(_, share)| share > 0.0) {
+                let weight = (1.0 - of_spline) * share;
                 self.descend(Query { low, p, order: &order, weight, splits: true }, scratch);
             }
         }
@@ -233,6 +241,24 @@ impl<'a> Sampler<'a> {
         let surface = self.controls.surface();
         let triangles = (0..surface.facets().len() as u32).map(|t| surface.facet_corners(t));
         winding_number(point, triangles) > 0.5
+    }
+
+    /// Shares of the orders of the axes, by the first axis of each. They are equal unless a wall is near. Beside a wall,
+    /// orders whose first ray does not meet it would interpolate along the wall, across kinks of the hat functions. Their
+    /// shares therefore vanish if the wall is less than half as far away along another axis.
+    ///
+    /// Whether a ray meets a wall changes abruptly at a re-entrant edge. Walls further away than such an edge therefore do
+    /// not count, which makes the shares continuous.
+    fn shares(&self, p: DVec3, scratch: &Scratch) -> [f64; 3] {
+        let range = self.edges.distance(&scratch.edges, p, WALL_RANGE);
+        let walls = ORDERS.map(|order| {
+            let ends = self.ends(p, order[0], [range; 2], [&scratch.around, &[]]);
+            ends[0].0.min(ends[1].0).max(MIN_WALL_DISTANCE)
+        });
+        let nearest = walls.into_iter().fold(f64::MAX, f64::min);
+        let shares = walls.map(|wall| fade(wall / nearest - 1.0));
+        let all: f64 = shares.iter().sum();
+        shares.map(|share| share / all)
     }
 
     /// Weight of the B-spline at `p`.

@@ -60,3 +60,36 @@ fn a_bent_bar_has_no_kinks_at_cell_faces() {
     let (largest, even) = (turns.fold(0.0, f64::max), 90.0 / 32.0 / 8.0);
     assert!(largest < 2.0 * even, "a turn of {largest} degrees, {even} if spread evenly");
 }
+
+/// Beside a face, weights tend to the face's hat functions, which are bilinear on squares, also across the edges of faces.
+#[test]
+fn beside_a_wall_weights_are_those_of_the_wall() {
+    let cage = cube();
+    let options = BindOptions { grid: 16, ..BindOptions::default() };
+    let depth = 3e-6;
+    for axis in 0..3 {
+        // Up to a quarter of a cell from the edge between two squares, at a third of the side.
+        let points: Vec<Vec3> = (0..40)
+            .map(|k| {
+                let mut p = Vec3::splat(depth);
+                p[(axis + 1) % 3] = 1.0 / 3.0 + (k as f32 - 20.0) / 20.0 / 64.0;
+                p[(axis + 2) % 3] = 0.41;
+                p
+            })
+            .collect();
+        let weights = bind(&points, &cage, &options, &NoProgress).unwrap().weights;
+        let worst = (0..cage.n_vertices())
+            .flat_map(|column| {
+                let corner = cage.positions()[column];
+                let hat = move |p: &Vec3| {
+                    let linear = |a: usize| (1.0 - 3.0 * (p[a] - corner[a]).abs()).max(0.0);
+                    let on_wall = if corner[axis] == 0.0 { 1.0 } else { 0.0 };
+                    on_wall * linear((axis + 1) % 3) * linear((axis + 2) % 3)
+                };
+                let column = weights.column(column as u32);
+                points.iter().zip(column).map(|(p, w)| (w - hat(p)).abs()).collect::<Vec<_>>()
+            })
+            .fold(0.0, f32::max);
+        assert!(worst < 2e-4, "axis {axis}: {worst}");
+    }
+}
