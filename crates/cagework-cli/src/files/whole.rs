@@ -33,14 +33,13 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     remove_stale_files(folder_of(path));
     let mut file = {
         let mut temporary = lock_temporary_file();
-        let file = create_temporary_file(folder_of(path))?;
+        let file = create_temporary_file(folder_of(path), permissions.is_some())?;
         *temporary = Some(file.path().to_path_buf());
         file
     };
-    let written = file
-        .as_file_mut()
-        .write_all(bytes)
-        .and_then(|()| permissions.map_or(Ok(()), |permissions| file.as_file().set_permissions(permissions)))
+    let written = permissions
+        .map_or(Ok(()), |permissions| file.as_file().set_permissions(permissions))
+        .and_then(|()| file.as_file_mut().write_all(bytes))
         // Some file systems report a full disk only when the file is synchronised.
         .and_then(|()| file.as_file().sync_all());
     let mut temporary = lock_temporary_file();
@@ -51,11 +50,17 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Creates a temporary file and locks it, so that [`remove_stale_files`] in another process does not delete it.
-fn create_temporary_file(folder: &Path) -> io::Result<NamedTempFile<File>> {
+/// `is_private`: only the user may open it, until it gets the permissions of the file that it replaces.
+fn create_temporary_file(folder: &Path, is_private: bool) -> io::Result<NamedTempFile<File>> {
+    let mut builder = Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
     loop {
-        // `File::create_new` applies the umask; tempfile's default would be private to the user.
-        let part =
-            Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, |path| File::create_new(path))?;
+        // `File::create_new` applies the umask; tempfile's default is private.
+        let part = if is_private {
+            builder.tempfile_in(folder)?
+        } else {
+            builder.make_in(folder, |path| File::create_new(path))?
+        };
         // Retry if another process deleted the file before it was locked. On file systems without locks, no process
         // deletes such files.
         if part.as_file().lock().is_err() || part.path().exists() {
@@ -97,4 +102,24 @@ pub(crate) fn abandon(end: &mut dyn FnMut()) {
 
 fn lock_temporary_file() -> MutexGuard<'static, Option<PathBuf>> {
     TEMPORARY_FILE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+
+    #[test]
+    fn temporary_file_of_a_private_file_is_private_from_its_creation() {
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let part = create_temporary_file(folder.path(), true).unwrap();
+        assert_eq!(mode(part.path()), 0o600);
+        let path = folder.path().join("weights.npz");
+        replace(&path, b"old").unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
+        replace(&path, b"new").unwrap();
+        assert_eq!((mode(&path), std::fs::read(&path).unwrap().as_slice()), (0o640, b"new".as_slice()));
+    }
 }
