@@ -255,17 +255,19 @@ pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd
     }
 }
 
-/// If no grid line hits a face, or a part is thinner than a cell, the bind gives a notice that names a sufficient grid.
+/// If the faces of a vertex are small, or a part is thinner than a cell, the bind gives a notice that names a sufficient
+/// grid.
 pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &BackEnd) {
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
     // The bar is rotated, so that grid lines cross its adjacent sides and not only its opposite sides.
     let turn = RandomGenerator::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
-    // The sides of the plate are strips of half a cell, which lie between two lines over their whole length.
+    // The sides of the plate are strips of a quarter of a cell: both strips of a vertex can lie between two lines over their
+    // whole length.
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(4.0, 3.0, 0.1) };
-    let plate = cage(&subdivided_box(bounds, 0.0, [4, 4, 4]));
-    for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16), (plate, 83)] {
+    let plate = cage(&subdivided_box(bounds, 0.0, [4, 4, 8]));
+    for (cage, grid) in [(fine, 8), (fin, 16), (bar, 16), (plate, 83)] {
         let points = points::inside(&cage, 50, 78);
         let notice = |grid: u32| {
             let report = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, 1e-5)).report;

@@ -17,12 +17,9 @@ const MAX_NORMAL_DOT: f64 = -0.5;
 /// Limit on the number of tests of a ray against a triangle. The faces of larger cages are sampled evenly.
 const MAX_TESTS: usize = 4_000_000;
 
-/// Width that a grid resolves, in cells. A thinner part may contain no cell centre, and then has no unknowns.
+/// Width of a part, and of the faces of a vertex, that a grid resolves, in cells. A thinner part may contain no cell centre,
+/// and then has no unknowns; smaller faces may meet no grid line, and then have no influence on the solution.
 const MIN_CELLS: f64 = 1.0;
-
-/// Area of all faces of a vertex that a grid resolves, in cell faces. Fewer than two grid lines meet a smaller area, so the
-/// vertex has little influence on the solution.
-const MIN_VERTEX_AREA: f64 = 1.0;
 
 /// Barycentric coordinates of the points of a triangle from which rays start: the centres of the four triangles into
 /// which its edge midpoints divide it.
@@ -65,9 +62,9 @@ type Triangle = (u32, [DVec3; 3], DVec3);
 pub struct NarrowPlaces {
     /// Narrowest first.
     places: Vec<NarrowPlace>,
-    /// Area of all faces of each vertex of the cage, object units squared; infinite for a vertex without faces.
+    /// Size of the faces around each vertex of the cage, object units; infinite for a vertex without faces.
     /// `[n_vertices]`
-    vertex_areas: Vec<f64>,
+    vertex_sizes: Vec<f64>,
     /// Longest side of the cage's box, object units.
     longest_side: f64,
 }
@@ -91,14 +88,23 @@ impl NarrowPlaces {
             of_face[triangle.0 as usize].push(triangle);
         }
         let area_of = |own: &[Triangle]| own.iter().map(|(.., cross)| 0.5 * cross.length()).sum::<f64>();
-        let mut vertex_areas = vec![f64::INFINITY; cage.n_vertices()];
+        // Of the faces of each vertex: their area and their two largest widths.
+        let mut of_vertex = vec![(0.0, [0.0; 2]); cage.n_vertices()];
         for (face, own) in cage.faces().iter().zip(&of_face) {
-            let area = area_of(own);
+            let outline: Vec<DVec3> =
+                face.iter().map(|&vertex| cage.positions()[vertex as usize].as_dvec3()).collect();
+            let (area, width) = (area_of(own), width_of(&outline));
             for &vertex in face {
-                let sum = &mut vertex_areas[vertex as usize];
-                *sum = if sum.is_finite() { *sum + area } else { area };
+                let (sum, [first, second]) = &mut of_vertex[vertex as usize];
+                *sum += area;
+                (*first, *second) = (width.max(*first), width.min(*first).max(*second));
             }
         }
+        let size = |&(area, [first, second]): &(f64, [f64; 2])| match area {
+            0.0 => f64::INFINITY,
+            _ => f64::min(f64::sqrt(area), first + second),
+        };
+        let vertex_sizes = of_vertex.iter().map(size).collect();
         let tests = 2 * RAY_ORIGINS.len() * triangles.len() * triangles.len();
         let step = tests.div_ceil(MAX_TESTS).max(1);
         let mut places = Vec::new();
@@ -116,7 +122,7 @@ impl NarrowPlaces {
         }
         places.sort_by(|a, b| a.width.total_cmp(&b.width));
         let longest_side = f64::from(surface.bounds().extent().max_element());
-        Self { places, vertex_areas, longest_side }
+        Self { places, vertex_sizes, longest_side }
     }
 
     /// Size of a cell, object units, of a grid with `cells` cells along the cage's longest side.
@@ -154,14 +160,12 @@ impl NarrowPlaces {
         let parts: Vec<NarrowPlace> =
             if thinnest.is_some() { self.parts().copied().filter(is_thin).collect() } else { Vec::new() };
         let vertices: Vec<u32> = (0..)
-            .zip(&self.vertex_areas)
-            .filter_map(|(vertex, &area)| (area < MIN_VERTEX_AREA * cell * cell).then_some(vertex))
+            .zip(&self.vertex_sizes)
+            .filter_map(|(vertex, &size)| (size < MIN_CELLS * cell).then_some(vertex))
             .collect();
-        let smallest = self.vertex_areas.iter().copied().fold(f64::INFINITY, f64::min);
-        let of_part = thinnest.map_or(0.0, |width| MIN_CELLS * self.longest_side / width);
-        let of_vertex =
-            if vertices.is_empty() { 0.0 } else { self.longest_side * (MIN_VERTEX_AREA / smallest).sqrt() };
-        let wanted = of_part.max(of_vertex).ceil();
+        let smallest = vertices.iter().map(|&vertex| self.vertex_sizes[vertex as usize]).reduce(f64::min);
+        let enough = |size: Option<f64>| size.map_or(0.0, |size| MIN_CELLS * self.longest_side / size);
+        let wanted = enough(thinnest).max(enough(smallest)).ceil();
         (wanted > 0.0).then(|| Unresolved {
             parts,
             vertices,
@@ -214,6 +218,16 @@ fn narrowest<'a>(mut places: impl Iterator<Item = &'a NarrowPlace>) -> Option<Na
             place.width * place.width <= area
         })
         .copied()
+}
+
+/// Width of a polygon: the smallest distance between an edge's line and the corner farthest from it.
+fn width_of(outline: &[DVec3]) -> f64 {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    let of_edge = |(&a, &b): (&DVec3, &DVec3)| {
+        let along = (b - a).normalize_or(DVec3::X);
+        outline.iter().map(|&p| (p - a).reject_from(along).length()).fold(0.0, f64::max)
+    };
+    edges.map(of_edge).fold(f64::INFINITY, f64::min)
 }
 
 /// Distances along rays from points of a triangle to the opposite triangle, with the point halfway; infinite where no
@@ -293,10 +307,10 @@ mod tests {
     #[test]
     fn vertex_with_small_faces_is_not_resolved_by_a_coarse_grid() {
         let mut mesh = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1, 1, 1]);
-        // A vertex in a corner triangle of the first face, with three faces of together 0.1 * 0.1 / 2.
+        // A vertex at the centre of a corner triangle of the first face. Its three faces are 0.04 wide at most.
         let face = mesh.faces.remove(0);
         let at = |k: usize| mesh.positions[face[k] as usize];
-        let (a, b, d) = (at(0), at(0).lerp(at(1), 0.1), at(0).lerp(at(3), 0.1));
+        let (a, b, d) = (at(0), at(0).lerp(at(1), 0.12), at(0).lerp(at(3), 0.12));
         let first = mesh.positions.len() as u32;
         mesh.positions.extend([b, d, (a + b + d) / 3.0]);
         let [b, d, tip] = [first, first + 1, first + 2];
@@ -315,8 +329,8 @@ mod tests {
         edge(3, 0, d, &mut mesh);
         let cage = Cage::new(&mesh).unwrap();
         let unresolved = NarrowPlaces::new((&cage).into()).unresolved(10).unwrap();
-        // The area of a cell face is 0.01 with 10 cells, and 0.005 with 10 sqrt(2) cells.
-        assert_eq!((unresolved.vertices.as_slice(), unresolved.cells), (&[tip][..], Some(15)));
-        assert!(unresolved.parts.is_empty() && unresolved.to_string().contains("15 cells"), "{unresolved}");
+        // A cell is as wide as two faces with 12.5 cells.
+        assert_eq!((unresolved.vertices.as_slice(), unresolved.cells), (&[tip][..], Some(13)));
+        assert!(unresolved.parts.is_empty() && unresolved.to_string().contains("13 cells"), "{unresolved}");
     }
 }
