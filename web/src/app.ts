@@ -81,7 +81,10 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
   });
   const tour = createTour(ctx, { bind, edit, view, files, works });
   const fixes: Record<NonNullable<Explanation["fix"]>, () => void> = {
-    coarser: () => void bind.again({ grid: Math.max(16, (store.get().bindOptions.grid || (store.get().report?.grid ?? 64)) / 2) }),
+    coarser: () =>
+      void bind.again({
+        grid: Math.max(16, (store.get().bindOptions.grid || (store.get().report?.grid ?? 64)) / 2),
+      }),
     fewer() {
       const { cage: found, cageOptions } = store.get();
       const vertices = Math.min(cageOptions.target, found?.info.vertices ?? cageOptions.target);

@@ -56,7 +56,10 @@ export function createView(
     if (now.slice === "off" || !cage?.usable) return;
     store.set({ slice: { ...slice, busy: true } });
     try {
-      await follow(signal, ctx.session().loadSlice(slice.axis, slice.position, report?.grid ?? bindOptions.grid));
+      await follow(
+        signal,
+        ctx.session().loadSlice(slice.axis, slice.position, report?.grid ?? bindOptions.grid),
+      );
     } finally {
       store.set({ slice: { ...store.get().slice, busy: false } });
       scene({});

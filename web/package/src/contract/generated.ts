@@ -14,7 +14,7 @@ export type BindOptions = {
 backend: Backend,
 /**
  * Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
- * Default 64.
+ * [`AUTO_GRID`] (0, or "auto" in JSON that is read) chooses the number for the cage. Default 0.
  */
 grid: number,
 /**
@@ -90,9 +90,13 @@ adapter?: string,
  */
 threads: number,
 /**
- * Requested number of cells along the longest side.
+ * Number of cells along the longest side, as requested or chosen.
  */
 grid: number,
+/**
+ * Explanation of a number that was chosen automatically.
+ */
+grid_reason?: string,
 /**
  * Cells of the grid along x, y, z.
  */
@@ -631,7 +635,7 @@ export type Fix = { "kind": "repair",
  */
 repair: Repair, } | { "kind": "grid",
 /**
- * Number of cells with which no measured part is thinner than a cell.
+ * Number of cells that resolves all parts of the cage.
  */
 cells: number, };
 /**
@@ -1493,7 +1497,7 @@ max_sum_error: number,
  * Number of stored weights.
  */
 nonzeros: number, };
-export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
+export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
 export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
