@@ -9,7 +9,7 @@ use super::memory::{estimate, field_bytes};
 use super::pipeline::{Fineness, PreparedBind};
 use super::points::{VertexCounts, WeldedPoints};
 use super::solving::{Solution, sample_fields, solve_fields};
-use super::voxels::{Voxelization, VoxelizedCage};
+use super::voxels::{Voxelization, VoxelizedCage, check_overlaps};
 use super::{BindError, Binding, Watch};
 use crate::controls::Controls;
 use crate::options::{BindOptions, Solver};
@@ -48,6 +48,7 @@ impl<'a> SolvedCage<'a> {
         let (controls, watch) = (controls.into(), Watch::new(progress));
         let options = BindOptions { held: 0, extra_points: 0, ..*options };
         let began = watch.now_ms();
+        check_overlaps(controls.surface())?;
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let none = VertexCounts { rows: 0, points: 0 };

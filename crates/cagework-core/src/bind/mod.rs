@@ -93,6 +93,17 @@ pub enum BindError {
         /// Number of cells along the cage's longest side.
         grid: u32,
     },
+    /// Too many parts of the cage overlap at the same places.
+    #[error(
+        "the cage overlaps itself too often: lines through it cross {walls:.0} walls inside other parts for each \
+         wall outside, more than the limit of {limit}: join its parts into one, for example by a Boolean union"
+    )]
+    Overlaps {
+        /// Number of walls inside other parts divided by the number of walls of the union of all parts.
+        walls: f64,
+        /// Limit on `walls`.
+        limit: f64,
+    },
     /// Vertices are outside the cage, and the policy is to fail.
     #[error("{} outside the cage, the first is vertex {first}: enlarge the cage", counted(*count as usize, "mesh vertex is", "mesh vertices are"))]
     Outside {
@@ -119,8 +130,8 @@ pub enum BindError {
 /// `positions`: `[n_vertices]`, object units, in any order. Vertices at equal positions are sampled once.
 ///
 /// # Errors
-/// [`BindError`]: an option is out of range, the mesh is empty or not finite, the memory exceeds the limit, no vertex
-/// is inside, or the bind is cancelled.
+/// [`BindError`]: an option is out of range, the mesh is empty or not finite, the memory exceeds the limit, too many
+/// parts of the cage overlap, no vertex is inside, or the bind is cancelled.
 pub fn bind<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,

@@ -32,7 +32,7 @@ use super::outside::{oversized, refuse_outside};
 use super::points::WeldedPoints;
 pub use super::solving::Solution;
 use super::solving::solve_and_sample;
-use super::voxels::{Voxelization, VoxelizedCage};
+use super::voxels::{Voxelization, VoxelizedCage, check_overlaps};
 use super::watch::Watch;
 use super::{BindError, Binding};
 
@@ -114,6 +114,7 @@ impl<'a> PreparedBind<'a> {
         options.check()?;
         let began = watch.now_ms();
         let mesh = WeldedPoints::new(positions)?;
+        check_overlaps(controls.surface())?;
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let field_threads = if fields == FieldStorage::Host { team.n_threads() } else { 0 };

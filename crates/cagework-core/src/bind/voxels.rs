@@ -16,10 +16,29 @@ use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::team::Team;
 use crate::voxelize::classic::{ClassicCells, place_grid};
-use crate::voxelize::embedded::Embedding;
-use crate::voxelize::lines::Overlaps;
+use crate::voxelize::embedded::{Embedding, shoot_lines};
+use crate::voxelize::lines::{Lines, Overlaps};
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
+
+/// Limit on the number of walls inside other parts of the cage, relative to the walls of the union of all parts. Grid
+/// lines and sampling rays cross all of them. The ratio is below 1 if few parts overlap at the same place.
+const MAX_INNER_WALLS: f64 = 16.0;
+
+/// Number of cells along the longest side of the grid whose lines count the walls. The ratio hardly depends on it.
+const COUNTING_GRID: u32 = 16;
+
+/// Checks how often a cage overlaps itself.
+///
+/// # Errors
+/// [`BindError::Overlaps`] if there are too many walls inside other parts.
+pub(super) fn check_overlaps(cage: &Cage) -> Result<(), BindError> {
+    let lines = shoot_lines(cage, &Grid::cubic(cage.bounds(), COUNTING_GRID));
+    let outer = lines.iter().map(Lines::n_hits).sum::<usize>().max(1);
+    let walls = Overlaps::of(&lines).inner as f64 / outer as f64;
+    let limit = MAX_INNER_WALLS;
+    if walls > limit { Err(BindError::Overlaps { walls, limit }) } else { Ok(()) }
+}
 
 #[derive(Debug)]
 pub(super) struct Voxelization {
@@ -145,5 +164,42 @@ impl AnySampler<'_> {
             }
             Self::Embedded(sampler) => sampler.stencils(points),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::bind::bind;
+    use crate::cage::subdivided_box;
+    use crate::mesh::{Bounds, PolygonMesh};
+    use crate::progress::NoProgress;
+
+    /// `n` unit cubes, each a little higher than the previous one. A vertical line crosses 2 walls of their union and
+    /// 2n - 2 inside it; horizontal lines cross no more.
+    fn shifted_cubes(n: usize) -> Cage {
+        let mut all = PolygonMesh::default();
+        for k in 0..n {
+            let min = Vec3::Z * (k as f32 * 1e-3);
+            let part = subdivided_box(Bounds { min, max: min + Vec3::ONE }, 0.0, [1; 3]);
+            let first = all.positions.len() as u32;
+            all.positions.extend(part.positions);
+            all.faces
+                .extend(part.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
+        }
+        Cage::new(&all).unwrap()
+    }
+
+    #[test]
+    fn cages_that_overlap_themselves_too_often_are_refused() {
+        let bound = |n| {
+            let options = BindOptions { grid: 8, threads: 1, ..BindOptions::default() };
+            bind(&[Vec3::splat(0.5)], &shifted_cubes(n), &options, &NoProgress).map(|bound| bound.report)
+        };
+        bound(17).unwrap();
+        let Err(BindError::Overlaps { walls, limit }) = bound(20) else { panic!("bound") };
+        assert!(walls > limit && walls <= 19.0, "{walls}");
     }
 }

@@ -4,6 +4,8 @@
 //! enters. Faces are sorted into columns, so that each ray is tested against few of them. If rounding could matter,
 //! because the ray passes near an edge or the point lies near a face, the angles of all triangles are summed instead.
 
+use std::borrow::Cow;
+
 use glam::{DVec2, DVec3};
 
 use crate::geometry::winding_number;
@@ -18,7 +20,7 @@ const MAX_COLUMNS: f64 = 64.0;
 /// Faces of a closed surface, sorted into columns along z.
 #[derive(Clone, Debug)]
 pub struct Columns<'a> {
-    triangles: &'a [[DVec3; 3]],
+    triangles: Cow<'a, [[DVec3; 3]]>,
     /// Corner of the first column in x and y, object units.
     low: DVec2,
     /// Number of columns per object unit along x and y.
@@ -32,7 +34,8 @@ pub struct Columns<'a> {
 impl<'a> Columns<'a> {
     /// Sorts the triangles of a closed surface, counter-clockwise seen from outside.
     #[must_use]
-    pub fn new(triangles: &'a [[DVec3; 3]]) -> Self {
+    pub fn new(triangles: impl Into<Cow<'a, [[DVec3; 3]]>>) -> Self {
+        let triangles = triangles.into();
         let corners = || triangles.iter().flatten().map(|p| p.truncate());
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         let high = corners().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -43,9 +46,10 @@ impl<'a> Columns<'a> {
         let side = (2.0 * (triangles.len() as f64).sqrt()).clamp(1.0, MAX_COLUMNS).floor();
         let per_unit = DVec2::splat(side) / (high - low).max(DVec2::splat(f64::MIN_POSITIVE));
         let side = side as usize;
-        let mut columns =
-            Self { triangles, low, per_unit, side, extent, over: vec![Vec::new(); side * side] };
-        for (number, triangle) in (0u32..).zip(triangles) {
+        let over = vec![Vec::new(); side * side];
+        let mut columns = Self { triangles, low, per_unit, side, extent, over };
+        for number in 0..columns.triangles.len() as u32 {
+            let triangle = columns.triangles[number as usize];
             let corners = triangle.map(DVec3::truncate);
             let near = DVec2::splat(TOLERANCE * extent);
             let [first, last] = [

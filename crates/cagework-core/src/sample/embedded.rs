@@ -19,7 +19,8 @@ use glam::DVec3;
 
 use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
-use crate::geometry::{closest_point_on_triangle, winding_number};
+use crate::enclosure::Columns;
+use crate::geometry::closest_point_on_triangle;
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
 use crate::options::OutsidePolicy;
@@ -71,6 +72,8 @@ pub struct Sampler<'a> {
     overlaps: &'a Overlaps,
     /// Sampler for points outside the cage, created for the first such point.
     beyond: OnceLock<OutsideSampler<'a>>,
+    /// Facets in cell coordinates for winding numbers, created for the first one.
+    columns: OnceLock<Columns<'static>>,
     policy: OutsidePolicy,
     /// Distance, in cells, up to which faces count as coincident.
     same: f64,
@@ -139,7 +142,8 @@ impl<'a> Sampler<'a> {
         let edges = EdgeLists::new(surface, grid, &lists);
         let same = CAGE_TOLERANCE * f64::from(surface.diagonal()) / grid.cell.max_element();
         let balls = Balls::new(controls, grid);
-        Self { controls, level, lists, edges, balls, overlaps, beyond: OnceLock::new(), policy, same }
+        let (beyond, columns) = (OnceLock::new(), OnceLock::new());
+        Self { controls, level, lists, edges, balls, overlaps, beyond, columns, policy, same }
     }
 
     /// Stencils of points (object units). Lists points outside the cage in `outside`.
@@ -213,7 +217,7 @@ impl<'a> Sampler<'a> {
             self.balls.correct(&scratch.balls, p, &mut scratch.stencil);
         }
         let doubtful = scratch.outside > MAX_OUTSIDE_WEIGHT && scratch.outside < 1.0 - MAX_OUTSIDE_WEIGHT;
-        let inside = if doubtful { self.winds_around(point) } else { scratch.outside < 0.5 };
+        let inside = if doubtful { self.winding_number(p) > 0.5 } else { scratch.outside < 0.5 };
         if inside && scratch.outside > 0.0 && scratch.outside < 1.0 {
             let scale = 1.0 / (1.0 - scratch.outside);
             let Stencil { nodes, hats } = &mut scratch.stencil;
@@ -237,10 +241,10 @@ impl<'a> Sampler<'a> {
         })
     }
 
-    fn winds_around(&self, point: DVec3) -> bool {
-        let surface = self.controls.surface();
-        let triangles = (0..surface.facets().len() as u32).map(|t| surface.facet_corners(t));
-        winding_number(point, triangles) > 0.5
+    /// Winding number of the cage around a point in cell coordinates.
+    fn winding_number(&self, p: DVec3) -> f64 {
+        let corners = || self.lists.all().iter().map(|t| t.corners).collect::<Vec<_>>();
+        self.columns.get_or_init(|| Columns::new(corners())).winding_number(p)
     }
 
     /// Shares of the orders of the axes, by the first axis of each. They are equal unless a wall is near. Beside a wall,
@@ -511,7 +515,7 @@ impl<'a> Sampler<'a> {
 
     /// Whether a point on a facet lies inside another part of the cage, so that the facet is not a wall there.
     fn is_within(&self, facet: u32, barycentric: [f64; 3]) -> bool {
-        let Overlaps { low, high } = self.overlaps;
+        let Overlaps { low, high, .. } = self.overlaps;
         if low.x > high.x {
             return false;
         }
@@ -525,8 +529,7 @@ impl<'a> Sampler<'a> {
         // Compute both winding numbers off the plane of the facet, with which facets of other parts may coincide.
         let [a, b, c] = corners;
         let off = 2.0 * self.same * (b - a).cross(c - a).normalize_or_zero();
-        let winding = |p: DVec3| winding_number(p, self.lists.all().iter().map(|t| t.corners));
-        0.5 * (winding(place + off) + winding(place - off)) > MIN_INNER_WINDING
+        0.5 * (self.winding_number(place + off) + self.winding_number(place - off)) > MIN_INNER_WINDING
     }
 }
 

@@ -39,33 +39,35 @@ pub struct Lines {
     overlaps: Overlaps,
 }
 
-/// Bounding box of all walls inside other parts of the cage, in cells, as found along grid lines. Empty, with infinite
-/// corners, if no parts overlap.
+/// Bounding box and number of the walls inside other parts of the cage, in cells, as found along grid lines. The box is
+/// empty, with infinite corners, if no parts overlap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlaps {
     /// Lowest corner.
     pub low: DVec3,
     /// Highest corner.
     pub high: DVec3,
+    /// Number of hits of grid lines with walls inside other parts.
+    pub inner: usize,
 }
 
 impl Default for Overlaps {
     fn default() -> Self {
-        Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
+        Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, inner: 0 }
     }
 }
 
 impl Overlaps {
-    /// Box that includes both corners.
-    fn including(self, low: DVec3, high: DVec3) -> Self {
-        Self { low: self.low.min(low), high: self.high.max(high) }
+    fn and(self, other: Self) -> Self {
+        let (low, high) = (self.low.min(other.low), self.high.max(other.high));
+        Self { low, high, inner: self.inner + other.inner }
     }
 
     /// Overlaps found along any of the three axes.
     #[must_use]
     pub fn of(lines: &[Lines; 3]) -> Self {
         let all = lines.iter().map(|lines| &lines.overlaps);
-        all.fold(Self::default(), |all, found| all.including(found.low, found.high))
+        all.fold(Self::default(), |all, found| all.and(*found))
     }
 }
 
@@ -140,7 +142,7 @@ impl Lines {
                         let mut wall = DVec3::splat(hit.t);
                         wall[u] = f64::from(line as u32 % self.n_u);
                         wall[v] = f64::from(line as u32 / self.n_u);
-                        self.overlaps = self.overlaps.including(wall, wall);
+                        self.overlaps = self.overlaps.and(Overlaps { low: wall, high: wall, inner: 1 });
                     }
                 }
                 first += n;
@@ -169,6 +171,12 @@ impl Lines {
         self.start.windows(2).enumerate().filter(|(_, w)| w[0] < w[1]).map(|(line, w)| {
             (line as u32 % self.n_u, line as u32 / self.n_u, &self.hits[w[0] as usize..w[1] as usize])
         })
+    }
+
+    /// Number of hits with walls of the union of all parts.
+    #[must_use]
+    pub fn n_hits(&self) -> usize {
+        self.hits.len()
     }
 
     /// Size in bytes.
