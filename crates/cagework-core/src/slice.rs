@@ -6,7 +6,7 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
-use crate::bind::fineness;
+use crate::bind::{fineness, updates};
 use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::Boundary as _;
@@ -65,7 +65,8 @@ impl Slice {
     ) -> Self {
         let controls = controls.into();
         let cage = controls.surface();
-        let cells = fineness::choose(options, &NarrowPlaces::new(controls), |_| true).cells;
+        let work = |options: &BindOptions| updates(controls, options);
+        let cells = fineness::choose(options, &NarrowPlaces::new(controls), |_| true, work).cells;
         match options.method {
             Method::Embedded => {
                 let grid = Grid::cubic(cage.bounds(), cells);

@@ -14,6 +14,10 @@ pub const ROUGH_GRID: u32 = AUTO_GRIDS[0];
 /// to 21 % had a weight off by more than 0.01 with 64 cells. With this choice it is 0 to 3 %.
 const CELLS_PER_PLACE: f64 = 4.0;
 
+/// Limit on the work of a solve in an automatic grid above the coarsest, in updates of single values: about 10 s on one
+/// core. A grid of 192 cells stays below it with up to 250 columns if a third of its cells are inside the cage.
+const MAX_UPDATES: f64 = 1e10;
+
 /// A grid, and why it was chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridChoice {
@@ -33,12 +37,14 @@ pub fn wanted_cells(places: &NarrowPlaces) -> u32 {
 }
 
 /// Chooses the grid of a bind: the number of the options, or with [`AUTO_GRID`] the number of [`wanted_cells`]. `fits`:
-/// whether a bind with these options stays within the memory limit; grids that do not fit are passed over. Classic cells
+/// whether a bind with these options stays within the memory limit; `updates`: its work. Grids that do not fit or exceed
+/// [`MAX_UPDATES`] are passed over. Classic cells
 /// and Jacobi sweeps always get the coarsest, because their number of sweeps grows with the square of the number of cells.
 pub(crate) fn choose(
     options: &BindOptions,
     places: &NarrowPlaces,
     fits: impl Fn(&BindOptions) -> bool,
+    updates: impl Fn(&BindOptions) -> f64,
 ) -> GridChoice {
     if options.grid != AUTO_GRID {
         return GridChoice { cells: options.grid, reason: None };
@@ -48,7 +54,10 @@ pub(crate) fn choose(
     }
     let wanted = wanted_cells(places);
     let allowed = AUTO_GRIDS.into_iter().rev().filter(|&cells| cells <= wanted);
-    let mut fitting = allowed.filter(|&cells| fits(&BindOptions { grid: cells, ..*options }));
+    let with = |cells| BindOptions { grid: cells, ..*options };
+    let is_quick = |&cells: &u32| cells == AUTO_GRIDS[0] || updates(&with(cells)) <= MAX_UPDATES;
+    let quick = allowed.clone().find(is_quick).unwrap_or(AUTO_GRIDS[0]);
+    let mut fitting = allowed.filter(|&cells| cells <= quick && fits(&with(cells)));
     let cells = fitting.next().unwrap_or(AUTO_GRIDS[0]);
     let reason = places.narrowest().map(|place| {
         let what = match place.side {
@@ -56,7 +65,9 @@ pub(crate) fn choose(
             Side::Outside => "narrowest gap",
         };
         let limit = size_rounded_down(options.memory_limit);
-        let limit = if cells < wanted {
+        let limit = if quick < wanted && cells == quick {
+            format!("; a grid of {wanted} cells would take more than {MAX_UPDATES:.0e} updates: choose it to use it")
+        } else if cells < wanted {
             format!("; a grid of {wanted} cells would need more than the memory limit of {limit}")
         } else {
             String::new()
@@ -95,6 +106,18 @@ mod tests {
             BindOptions { solver: Solver::Jacobi, ..BindOptions::default() },
         ] {
             assert_eq!(choose_grid(&plate(0.001), &options).unwrap().cells, 64);
+        }
+    }
+
+    #[test]
+    fn grids_that_would_take_long_are_passed_over() {
+        let cage = plate(0.02);
+        let places = NarrowPlaces::new((&cage).into());
+        for (work_of_192, cells) in [(1e10, 192), (1.1e10, 128), (1e12, 64)] {
+            let updates = |options: &BindOptions| work_of_192 * (f64::from(options.grid) / 192.0).powi(3);
+            let choice = choose(&BindOptions::default(), &places, |_| true, updates);
+            assert_eq!(choice.cells, cells, "{choice:?}");
+            assert_eq!(choice.reason.unwrap().contains("more than 1e10 updates"), cells < 192);
         }
     }
 

@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use super::BindError;
 use super::points::VertexCounts;
+use super::voxels::Voxelization;
 use crate::controls::{Controls, InnerControls};
 use crate::grid::Grid;
 
@@ -135,9 +136,10 @@ pub(super) fn estimate(
 }
 
 /// Estimates the number of updates of single values in a solve: unknowns times columns times sweeps.
-pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions) -> f64 {
+pub(crate) fn updates(controls: Controls<'_>, options: &BindOptions) -> f64 {
     /// Work of a multigrid solve, in sweeps of the finest level (benches/README.md).
     const MULTIGRID_SWEEPS: f64 = 18.0;
+    let grid = Voxelization::grid(controls.surface(), options);
     let Bounds { min, max } = controls.surface().bounds();
     let widths = ((max - min).as_dvec3() / grid.cell).max(DVec3::ONE).to_array();
     // In a box, a Jacobi sweep multiplies the slowest mode of the error by 1 - decay. This mode is one half-wave along
@@ -150,7 +152,7 @@ pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions
         Solver::Jacobi => digits / decay,
     };
     let columns = controls.n_controls().div_ceil(LANES) * LANES;
-    counts(controls, grid).unknowns * columns as f64 * sweeps.min(options.max_iterations as f64)
+    counts(controls, &grid).unknowns * columns as f64 * sweeps.min(options.max_iterations as f64)
 }
 
 pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
@@ -189,7 +191,6 @@ fn counts(controls: Controls<'_>, grid: &Grid) -> Counts {
 mod tests {
     use super::*;
     use crate::bind::bind;
-    use crate::bind::voxels::Voxelization;
     use crate::cage::{Cage, subdivided_box};
     use crate::controls::{ControlSet, InnerElement};
     use crate::mesh::PolygonMesh;

@@ -13,6 +13,7 @@ mod watch;
 
 pub use fineness::GridChoice;
 pub use many::SolvedCage;
+pub(crate) use memory::updates;
 pub use memory::weights_bytes;
 pub use outside::Misfit;
 pub use watch::Watch;
@@ -159,13 +160,14 @@ pub fn estimate_memory<'a>(
         memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes
     };
     let fits = |options: &BindOptions| estimate(options) <= options.memory_limit;
-    let grid = fineness::choose(options, &NarrowPlaces::new(controls), fits).cells;
+    let work = |options: &BindOptions| updates(controls, options);
+    let grid = fineness::choose(options, &NarrowPlaces::new(controls), fits, work).cells;
     Ok(estimate(&BindOptions { grid, ..*options }))
 }
 
 /// Chooses the grid of a bind, as [`bind`] does if memory suffices: the number of the options, or with
 /// [`AUTO_GRID`](crate::options::AUTO_GRID) the coarsest of [`fineness::AUTO_GRIDS`] in which the narrowest part and gap of
-/// the cage are four cells wide.
+/// the cage are four cells wide, unless the solve would take long.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.
@@ -175,7 +177,8 @@ pub fn choose_grid<'a>(
 ) -> Result<GridChoice, BindError> {
     options.check()?;
     let controls = controls.into();
-    Ok(fineness::choose(options, &NarrowPlaces::new(controls), |_| true))
+    let work = |options: &BindOptions| updates(controls, options);
+    Ok(fineness::choose(options, &NarrowPlaces::new(controls), |_| true, work))
 }
 
 /// Estimates the work of a solve: the number of updates of single values, which is unknowns times columns times sweeps.
@@ -189,6 +192,5 @@ pub fn estimate_updates<'a>(
 ) -> Result<f64, BindError> {
     let controls = controls.into();
     let options = BindOptions { grid: choose_grid(controls, options)?.cells, ..*options };
-    let grid = voxels::Voxelization::grid(controls.surface(), &options);
-    Ok(memory::updates(controls, &grid, &options))
+    Ok(updates(controls, &options))
 }

@@ -26,7 +26,7 @@ use crate::weights::Weights;
 use crate::words::counted;
 
 use super::fineness::{self, GridChoice};
-use super::memory::{estimate, needs_all};
+use super::memory::{estimate, needs_all, updates};
 use super::offsets::{JointPoints, Offsets};
 use super::outside::{oversized, refuse_outside};
 use super::points::WeldedPoints;
@@ -77,7 +77,7 @@ impl Fineness {
         fits: impl Fn(&BindOptions) -> bool,
     ) -> Self {
         let places = NarrowPlaces::new(controls);
-        let choice = fineness::choose(options, &places, fits);
+        let choice = fineness::choose(options, &places, fits, |options| updates(controls, options));
         // Classic cells count wherever the cage touches them, so no part is too thin.
         let unresolved = match options.method {
             Method::Classic => None,
