@@ -107,19 +107,20 @@ test("every fault has a button that repairs it", async ({ page }) => {
   }
 
   await test.step("a cage thinner than a cell", async () => {
-    const flat = boxFaces([1, 1, 1 / 128]);
-    await show(page, { cage: flat, model: [0.8, 0.8, 0.006] });
+    const flat = boxFaces([1, 1, 1 / 256]);
+    await show(page, { cage: flat, model: [0.8, 0.8, 0.003] });
     await bound(page);
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const card = panel.locator(".problem-card").filter({ hasText: /thinner than a cell/ });
-    // The part is 2 long and 2/128 thick, one cell at a grid of 128. (Powers of two are exact in OBJ files and f32.)
-    await card.getByRole("button", { name: /Bind with 128 cells/ }).click();
+    // The part is 2 long and 2/256 thick, one cell at a grid of 256; the automatic grid has at most 192 cells. (Powers of two
+    // are exact in OBJ files and f32.)
+    await card.getByRole("button", { name: /Bind with 256 cells/ }).click();
     await expect(card.getByText("Fine enough")).toBeVisible();
     await bound(page);
     await page.getByRole("button", { name: "Bind", exact: false }).first().click();
     await expect(
       panel
-        .getByText(/\b128\b/)
+        .getByText(/\b256\b/)
         .filter({ visible: true })
         .first(),
     ).toBeVisible();

@@ -379,17 +379,25 @@ pub fn parse_grid(text: &str) -> Result<u32, RangeError> {
 /// Word for [`AUTO_GRID`].
 const AUTO: &str = "auto";
 
+/// Deserializes [`BindOptions::grid`]: a number of cells or the word "auto".
 fn grid_or_auto<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum GridOrAuto {
-        Cells(u32),
-        Word(String),
+    struct Grid;
+    impl serde::de::Visitor<'_> for Grid {
+        type Value = u32;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str(GRID.allowed)
+        }
+
+        fn visit_u64<E: serde::de::Error>(self, cells: u64) -> Result<u32, E> {
+            u32::try_from(cells).map_err(|_| E::custom(GRID.refuse(&cells.to_string())))
+        }
+
+        fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<u32, E> {
+            parse_grid(word).map_err(E::custom)
+        }
     }
-    match GridOrAuto::deserialize(deserializer)? {
-        GridOrAuto::Cells(cells) => Ok(cells),
-        GridOrAuto::Word(word) => parse_grid(&word).map_err(serde::de::Error::custom),
-    }
+    deserializer.deserialize_any(Grid)
 }
 
 impl BindOptions {
@@ -452,7 +460,10 @@ mod tests {
         let options = |json: &str| serde_json::from_str::<BindOptions>(json).map(|options| options.grid);
         assert_eq!(options(r#"{"grid":"auto"}"#).unwrap(), AUTO_GRID);
         assert_eq!([options("{}").unwrap(), options(r#"{"grid":32}"#).unwrap()], [AUTO_GRID, 32]);
-        assert!(options(r#"{"grid":"fine"}"#).is_err());
+        for wrong in ["\"fine\"", "64.5", "-8", "1e10", "5000000000", "[]"] {
+            let error = options(&format!(r#"{{"grid":{wrong}}}"#)).unwrap_err().to_string();
+            assert!(error.contains("from 8 to 512"), "{error}");
+        }
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
         assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());

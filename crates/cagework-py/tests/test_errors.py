@@ -31,7 +31,7 @@ def test_invalid_cage_gives_the_error_message_of_the_command(tmp_path):
 @pytest.mark.parametrize(
     ("call", "kind", "message"),
     [
-        (lambda: cw.bind(POINT, CUBE, grid=7), cw.OptionError, "grid is 7; it must be a whole number from 8 to 512"),
+        (lambda: cw.bind(POINT, CUBE, grid=7), cw.OptionError, "grid is 7; it must be auto .0. or a whole number from 8 to 512"),
         (lambda: cw.bind(POINT, CUBE, grid=64.5), cw.OptionError, "grid: .*64.5"),
         (lambda: cw.bind(POINT, CUBE, solver="gauss"), cw.OptionError, "solver: .*gauss.*jacobi"),
         (lambda: cw.bind(POINT, CUBE, tau=[1]), cw.OptionError, "tau is of type .*list"),

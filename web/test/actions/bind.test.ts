@@ -66,7 +66,7 @@ it("a cancelled bind keeps the previous bind active and marks the chosen setting
   await second;
   expect(said).toEqual(["Cancelled. The previous bind is still active."]);
   expect(store.get()).toMatchObject({ bound: true, bindRun: null, bindOptions: { grid: 256 } });
-  expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([true, 64]);
+  expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([true, 0]);
   expect(problems).toEqual([]);
   const third = bind.start();
   await settled();

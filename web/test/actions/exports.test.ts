@@ -191,7 +191,7 @@ it("a project contains the page's settings", async () => {
   store.set({ tools: { ...store.get().tools, symmetry: true } });
   project.write();
   expect(JSON.parse(written[0] ?? "")).toMatchObject({
-    bind: { grid: 64 },
+    bind: { grid: 0 },
     cage: { target: 80 },
     symmetry: true,
   });

@@ -75,13 +75,12 @@ impl Workspace {
     /// Allocates fields of all levels.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
-        let fields = || hierarchy.levels.iter().map(|l| vec![ZERO; l.n_rows()]);
+        let field = |level: &Level| vec![ZERO; level.n_rows()];
         // `f[0]` is sized later: its length depends on the kind of right-hand side.
-        let mut f: Vec<_> = fields().collect();
-        f[0] = Vec::new();
+        let f = std::iter::once(Vec::new()).chain(hierarchy.levels[1..].iter().map(field));
         Self {
-            u: fields().collect(),
-            f,
+            u: hierarchy.levels.iter().map(field).collect(),
+            f: f.collect(),
             residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
             is_finest_dense: false,
             may_fall_back: true,
