@@ -309,7 +309,10 @@ test("errors name the argument, its value and the expected one", async () => {
     [() => bind([1, 2], cage), /^points has 2 numbers; three for each point are needed, so 0 or 3$/],
     [() => bind(mesh.positions, { ...cage, corners: [3, 0, 1] }), /^the last face of the cage is cut off$/],
     [() => bind(mesh.positions, cage, { gird: 32 }), /^unknown option gird; the options are .*grid/],
-    [() => bind(mesh.positions, cage, { grid: 4 }), /^grid is 4; it must be auto \(0\) or a whole number from 8 to 512$/],
+    [
+      () => bind(mesh.positions, cage, { grid: 4 }),
+      /^grid is 4; it must be auto \(0\) or a whole number from 8 to 512$/,
+    ],
     [() => bind(mesh.positions, cage, { grid: "32" }), /^grid is a string; it must be a number$/],
     [() => bind(mesh.positions, cage, { backend: "gpu" }), /^WebGPU is missing here/, "NoAdapter"],
     [() => deform(weights, [1, 2, 3]), new RegExp(`^posed has 3 numbers; it must have ${n},`)],
