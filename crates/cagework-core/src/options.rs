@@ -393,6 +393,15 @@ fn grid_or_auto<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32
             u32::try_from(cells).map_err(|_| E::custom(GRID.refuse(&cells.to_string())))
         }
 
+        fn visit_i64<E: serde::de::Error>(self, cells: i64) -> Result<u32, E> {
+            u32::try_from(cells).map_err(|_| E::custom(GRID.refuse(&cells.to_string())))
+        }
+
+        // JavaScript passes all numbers as f64.
+        fn visit_f64<E: serde::de::Error>(self, cells: f64) -> Result<u32, E> {
+            GRID.check(cells).map(|()| cells as u32).map_err(E::custom)
+        }
+
         fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<u32, E> {
             parse_grid(word).map_err(E::custom)
         }
