@@ -15,7 +15,7 @@ use crate::words::counted;
 const MAX_NORMAL_DOT: f64 = -0.5;
 
 /// Limit on the number of tests of a ray against a triangle. The faces of larger cages are sampled evenly.
-const MAX_TESTS: usize = 4_000_000;
+const MAX_TESTS: u64 = 4_000_000;
 
 /// Width of a part, and of the faces of a vertex, that a grid resolves, in cells. A thinner part may contain no cell centre,
 /// and then has no unknowns; smaller faces may meet no grid line, and then have no influence on the solution.
@@ -48,7 +48,7 @@ pub struct NarrowPlace {
     pub side: Side,
     /// Median distance to the opposite faces, object units.
     pub width: f64,
-    /// Area of the face, object units squared.
+    /// Area of the face, and of the faces near it that are not measured, object units squared.
     pub area: f64,
     /// Point halfway between the face and an opposite one, object units.
     pub middle: DVec3,
@@ -105,8 +105,8 @@ impl NarrowPlaces {
             _ => f64::min(f64::sqrt(area), first + second),
         };
         let vertex_sizes = of_vertex.iter().map(size).collect();
-        let tests = 2 * RAY_ORIGINS.len() * triangles.len() * triangles.len();
-        let step = tests.div_ceil(MAX_TESTS).max(1);
+        let tests = (2 * RAY_ORIGINS.len()) as u64 * (triangles.len() as u64).pow(2);
+        let step = tests.div_ceil(MAX_TESTS).max(1) as usize;
         let mut places = Vec::new();
         for (face, own) in (0..).zip(&of_face).step_by(step) {
             for side in [Side::Inside, Side::Outside] {
@@ -116,7 +116,8 @@ impl NarrowPlaces {
                 if let Some(&(width, middle)) = widths.get(widths.len() / 2)
                     && width.is_finite()
                 {
-                    places.push(NarrowPlace { face, side, width, area: area_of(own), middle });
+                    let area = area_of(own) * step as f64;
+                    places.push(NarrowPlace { face, side, width, area, middle });
                 }
             }
         }
@@ -165,13 +166,13 @@ impl NarrowPlaces {
             .collect();
         let smallest = vertices.iter().map(|&vertex| self.vertex_sizes[vertex as usize]).reduce(f64::min);
         let enough = |size: Option<f64>| size.map_or(0.0, |size| MIN_CELLS * self.longest_side / size);
-        let wanted = enough(thinnest).max(enough(smallest)).ceil();
-        (wanted > 0.0).then(|| Unresolved {
-            parts,
-            vertices,
-            // Rounding can give the number that is not enough.
-            cells: (wanted <= f64::from(MAX_GRID)).then_some((wanted as u32).max(cells + 1)),
-        })
+        if parts.is_empty() && vertices.is_empty() {
+            return None;
+        }
+        // Rounding can give the number that is not enough.
+        let wanted = enough(thinnest).max(enough(smallest)).ceil().max(f64::from(cells) + 1.0);
+        let cells = (wanted <= f64::from(MAX_GRID)).then_some(wanted as u32);
+        Some(Unresolved { parts, vertices, cells })
     }
 }
 
@@ -191,7 +192,7 @@ impl std::fmt::Display for Unresolved {
         let places = self.parts.first().map(|thinnest| {
             let [x, y, z] = thinnest.middle.as_vec3().to_array();
             let n = counted(self.parts.len(), "face", "faces");
-            format!("the cage is thinner than a cell behind {n}, most at ({x:.3}, {y:.3}, {z:.3})")
+            format!("the cage is thinner than a cell behind {n}, thinnest at ({x:.3}, {y:.3}, {z:.3})")
         });
         let vertices = self.vertices.first().map(|first| match self.vertices.len() {
             1 => format!("the faces of vertex {first} are smaller than a cell"),
@@ -259,25 +260,18 @@ mod tests {
     use glam::{Vec3, vec3};
 
     use super::*;
+    use crate::cage::shapes::together;
     use crate::cage::{Cage, subdivided_box};
     use crate::mesh::{Bounds, PolygonMesh};
 
-    fn boxes(boxes: &[(Vec3, Vec3, [u32; 3])]) -> Cage {
-        let mut all = PolygonMesh::default();
-        for &(min, max, divisions) in boxes {
-            let mesh = subdivided_box(Bounds { min, max }, 0.0, divisions);
-            let first = all.positions.len() as u32;
-            all.positions.extend(mesh.positions);
-            all.faces
-                .extend(mesh.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
-        }
-        Cage::new(&all).unwrap()
-    }
-
     #[test]
     fn thickness_and_gap_of_two_plates() {
-        let at = |z: f32, height: f32| (vec3(0.0, 0.0, z), vec3(4.0, 4.0, z + height), [4, 4, 1]);
-        let places = NarrowPlaces::new((&boxes(&[at(0.0, 0.5), at(0.75, 1.0)])).into());
+        let plate = |z: f32, height: f32| {
+            let bounds = Bounds { min: vec3(0.0, 0.0, z), max: vec3(4.0, 4.0, z + height) };
+            subdivided_box(bounds, 0.0, [4, 4, 1])
+        };
+        let cage = Cage::new(&together(&plate(0.0, 0.5), &plate(0.75, 1.0))).unwrap();
+        let places = NarrowPlaces::new((&cage).into());
         let narrowest = places.narrowest().unwrap();
         assert_eq!((narrowest.side, narrowest.width, narrowest.middle.z), (Side::Outside, 0.25, 0.625));
         let thinnest = places.thinnest().unwrap();

@@ -7,7 +7,7 @@ use crate::words::size_rounded_down;
 /// Grids that the automatic choice considers, coarsest first.
 pub const AUTO_GRIDS: [u32; 4] = [64, 96, 128, 192];
 
-/// Grid of binds whose weights need not be precise: of the probes of a pull, and of poses that move to another cage.
+/// Grid for weights that need not be precise: those of the probes of a pull, and those that move poses to another cage.
 pub const ROUGH_GRID: u32 = AUTO_GRIDS[0];
 
 /// Wanted width of the narrowest part and gap of the cage, in cells. Of the vertices of six models in generated cages, 4

@@ -191,6 +191,7 @@ fn counts(controls: Controls<'_>, grid: &Grid) -> Counts {
 mod tests {
     use super::*;
     use crate::bind::bind;
+    use crate::cage::shapes::together;
     use crate::cage::{Cage, subdivided_box};
     use crate::controls::{ControlSet, InnerElement};
     use crate::mesh::PolygonMesh;
@@ -232,7 +233,11 @@ mod tests {
         let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
         let bar = cube.positions.iter().map(|p| turn * Vec3::new(p.x, 0.2 * p.y, 0.1 * p.z)).collect();
         let bar = PolygonMesh { positions: bar, ..cube.clone() };
-        let two = two_boxes();
+        let plate = |x: f32| {
+            let bounds = Bounds { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 0.3, 1.0, 1.0) };
+            subdivided_box(bounds, 0.0, [2, 4, 4])
+        };
+        let two = together(&plate(0.0), &plate(0.5));
         let ball = InnerControls {
             positions: vec![Vec3::splat(0.5)],
             elements: vec![InnerElement::Point(0)],
@@ -244,7 +249,7 @@ mod tests {
             ("cube, one thread", &cube, None, BindOptions { threads: 1, ..usual }),
             ("ball", &cube, Some(ball), usual),
             ("bar", &bar, None, BindOptions { grid: 64, ..usual }),
-            ("two boxes", &two, None, usual),
+            ("two plates", &two, None, usual),
             ("conjugate gradients", &cube, None, BindOptions { solver: Solver::ConjugateGradient, ..usual }),
             ("Jacobi", &cube, None, BindOptions { solver: Solver::Jacobi, tau: 1e-2, ..usual }),
             ("classic", &cube, None, BindOptions { grid: 48, method: Method::Classic, tau: 1e-2, ..usual }),
@@ -257,19 +262,6 @@ mod tests {
             let ratio = memory.estimated as f64 / memory.peak as f64;
             assert!((0.85..1.15).contains(&ratio), "{name}: {ratio:.3} of {} bytes", memory.peak);
         }
-    }
-
-    /// Two plates beside each other.
-    fn two_boxes() -> PolygonMesh {
-        let at = |x: f32| {
-            let bounds = Bounds { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 0.3, 1.0, 1.0) };
-            subdivided_box(bounds, 0.0, [2, 4, 4])
-        };
-        let (mut both, other) = (at(0.0), at(0.5));
-        let first = both.positions.len() as u32;
-        both.positions.extend(other.positions);
-        both.faces.extend(other.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
-        both
     }
 
     /// A threshold need not drop any weight, so the estimate must hold for all weights.

@@ -173,23 +173,17 @@ mod tests {
 
     use super::*;
     use crate::bind::bind;
-    use crate::cage::subdivided_box;
-    use crate::mesh::{Bounds, PolygonMesh};
+    use crate::cage::shapes::{cuboid, together};
     use crate::progress::NoProgress;
 
     /// `n` unit cubes, each a little higher than the previous one. A vertical line crosses 2 walls of their union and
     /// 2n - 2 inside it; horizontal lines cross no more.
     fn shifted_cubes(n: usize) -> Cage {
-        let mut all = PolygonMesh::default();
-        for k in 0..n {
+        let cube = |k: usize| {
             let min = Vec3::Z * (k as f32 * 1e-3);
-            let part = subdivided_box(Bounds { min, max: min + Vec3::ONE }, 0.0, [1; 3]);
-            let first = all.positions.len() as u32;
-            all.positions.extend(part.positions);
-            all.faces
-                .extend(part.faces.into_iter().map(|face| face.into_iter().map(|v| first + v).collect()));
-        }
-        Cage::new(&all).unwrap()
+            cuboid(min, min + Vec3::ONE)
+        };
+        Cage::new(&(1..n).fold(cube(0), |all, k| together(&all, &cube(k)))).unwrap()
     }
 
     #[test]
