@@ -54,8 +54,32 @@ pub struct NarrowPlace {
     pub middle: DVec3,
 }
 
-/// A triangle of the surface: its face of the cage, corners, and normal times twice its area.
-type Triangle = (u32, [DVec3; 3], DVec3);
+/// A triangle of the surface.
+#[derive(Clone, Copy)]
+struct Triangle {
+    /// Face of the cage.
+    face: u32,
+    corners: [DVec3; 3],
+    /// Normal times twice the area.
+    cross: DVec3,
+    /// A sphere that contains the triangle: centre and squared radius.
+    sphere: (DVec3, f64),
+}
+
+impl Triangle {
+    fn new(face: u32, corners: [DVec3; 3]) -> Self {
+        let [a, b, c] = corners;
+        let center = (a + b + c) / 3.0;
+        let radius_squared = corners.map(|p| p.distance_squared(center)).into_iter().fold(0.0, f64::max);
+        Self { face, corners, cross: (b - a).cross(c - a), sphere: (center, 1.001 * radius_squared) }
+    }
+
+    /// Whether a line through `from` along a unit vector may meet the triangle.
+    fn may_meet(&self, from: DVec3, way: DVec3) -> bool {
+        let (center, radius_squared) = self.sphere;
+        (center - from).reject_from_normalized(way).length_squared() <= radius_squared
+    }
+}
 
 /// All narrow places of a cage.
 #[derive(Clone, Debug, Default)]
@@ -78,16 +102,16 @@ impl NarrowPlaces {
         let triangles: Vec<Triangle> = (0..)
             .zip(surface.face_of_triangle())
             .filter_map(|(triangle, &part)| {
-                let corners @ [a, b, c] = surface.triangle_corners(triangle);
-                Some((controls.cage_face(part)?, corners, (b - a).cross(c - a)))
+                Some(Triangle::new(controls.cage_face(part)?, surface.triangle_corners(triangle)))
             })
             .collect();
         let cage = controls.cage();
         let mut of_face = vec![Vec::new(); cage.faces().len()];
         for &triangle in &triangles {
-            of_face[triangle.0 as usize].push(triangle);
+            of_face[triangle.face as usize].push(triangle);
         }
-        let area_of = |own: &[Triangle]| own.iter().map(|(.., cross)| 0.5 * cross.length()).sum::<f64>();
+        let area_of =
+            |own: &[Triangle]| own.iter().map(|triangle| 0.5 * triangle.cross.length()).sum::<f64>();
         // Of the faces of each vertex: their area and their two largest widths.
         let mut of_vertex = vec![(0.0, [0.0; 2]); cage.n_vertices()];
         for (face, own) in cage.faces().iter().zip(&of_face) {
@@ -234,20 +258,19 @@ fn width_of(outline: &[DVec3]) -> f64 {
 /// Distances along rays from points of a triangle to the opposite triangle, with the point halfway; infinite where no
 /// triangle is opposite.
 fn widths(own: &Triangle, side: Side, triangles: &[Triangle]) -> [(f64, DVec3); RAY_ORIGINS.len()] {
-    let (_, own_corners, cross) = own;
-    let normal = cross.normalize_or_zero();
+    let normal = own.cross.normalize_or_zero();
     let way = if side == Side::Inside { -normal } else { normal };
     RAY_ORIGINS.map(|shares| {
-        let from = (0..3).map(|k| shares[k] * own_corners[k]).sum::<DVec3>();
+        let from = (0..3).map(|k| shares[k] * own.corners[k]).sum::<DVec3>();
         let (mut width, mut facing) = (f64::INFINITY, DVec3::ZERO);
-        for (_, corners, cross) in triangles {
+        for triangle in triangles.iter().filter(|triangle| triangle.may_meet(from, way)) {
             // Triangles that touch the ray's own are at distance 0. They bound no part and no gap.
-            if corners != own_corners
-                && let Some(distance) = distance_along(from, way, *corners)
+            if triangle.corners != own.corners
+                && let Some(distance) = distance_along(from, way, triangle.corners)
                 && distance > 0.0
                 && distance < width
             {
-                (width, facing) = (distance, *cross);
+                (width, facing) = (distance, triangle.cross);
             }
         }
         let is_opposite = normal.dot(facing.normalize_or_zero()) <= MAX_NORMAL_DOT;

@@ -81,7 +81,7 @@ pub struct Sampler<'a> {
 
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Facets within the larger distance of [`BLEND`] of the point.
+    /// Facets in a box around the point.
     around: Vec<u32>,
     /// Facets in the current cube.
     near: Vec<u32>,
@@ -186,16 +186,13 @@ impl<'a> Sampler<'a> {
             return false;
         }
         let low = p.floor().to_array().map(|x| x as u32);
-        let Scratch { around, near, .. } = scratch;
-        self.lists.in_box(p - BLEND[1], p + BLEND[1], around);
-        near.clear();
-        near.extend(around.iter().filter(|&&t| self.lists.triangle(t).meets(p.floor(), p.floor() + 1.0)));
+        self.lists.in_cube(low, &mut scratch.near);
         self.edges.in_cube(low, &mut scratch.edges);
         self.balls.near(low, &mut scratch.balls);
         // Outside the cage, the centres of the B-spline may lie outside the grid.
         let is_inside = self.level.row_of[grid.index(p.round().to_array().map(|x| x as u32))] != NO_CELL;
         let may_be_far = is_inside && scratch.near.is_empty();
-        let of_spline = if may_be_far { self.of_spline(p, &scratch.around) } else { 0.0 };
+        let of_spline = if may_be_far { self.of_spline(p, &mut scratch.around) } else { 0.0 };
         if of_spline > 0.0 {
             self.quadratic(p, of_spline, scratch);
         }
@@ -253,7 +250,11 @@ impl<'a> Sampler<'a> {
     ///
     /// Whether a ray meets a wall changes abruptly at a re-entrant edge. Walls further away than such an edge therefore do
     /// not count, which makes the shares continuous.
-    fn shares(&self, p: DVec3, scratch: &Scratch) -> [f64; 3] {
+    fn shares(&self, p: DVec3, scratch: &mut Scratch) -> [f64; 3] {
+        self.lists.in_box(p - WALL_RANGE, p + WALL_RANGE, &mut scratch.around);
+        if scratch.around.is_empty() {
+            return [1.0 / 3.0; 3];
+        }
         let range = self.edges.distance(&scratch.edges, p, WALL_RANGE);
         let walls = ORDERS.map(|order| {
             let ends = self.ends(p, order[0], [range; 2], [&scratch.around, &[]]);
@@ -266,9 +267,10 @@ impl<'a> Sampler<'a> {
     }
 
     /// Weight of the B-spline at `p`.
-    fn of_spline(&self, p: DVec3, around: &[u32]) -> f64 {
+    fn of_spline(&self, p: DVec3, around: &mut Vec<u32>) -> f64 {
+        self.lists.in_box(p - BLEND[1], p + BLEND[1], around);
         let mut distance = BLEND[1];
-        for &number in around {
+        for &number in &*around {
             distance = distance.min(self.lists.triangle(number).max_norm_distance(p));
             if distance <= BLEND[0] {
                 return 0.0;
