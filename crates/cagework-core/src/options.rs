@@ -381,6 +381,8 @@ const AUTO: &str = "auto";
 
 /// Deserializes [`BindOptions::grid`]: a number of cells or the word "auto".
 fn grid_or_auto<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    use serde::de::Unexpected;
+
     struct Grid;
     impl serde::de::Visitor<'_> for Grid {
         type Value = u32;
@@ -390,20 +392,21 @@ fn grid_or_auto<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32
         }
 
         fn visit_u64<E: serde::de::Error>(self, cells: u64) -> Result<u32, E> {
-            u32::try_from(cells).map_err(|_| E::custom(GRID.refuse(&cells.to_string())))
+            u32::try_from(cells).map_err(|_| E::invalid_value(Unexpected::Unsigned(cells), &self))
         }
 
         fn visit_i64<E: serde::de::Error>(self, cells: i64) -> Result<u32, E> {
-            u32::try_from(cells).map_err(|_| E::custom(GRID.refuse(&cells.to_string())))
+            u32::try_from(cells).map_err(|_| E::invalid_value(Unexpected::Signed(cells), &self))
         }
 
         // JavaScript passes all numbers as f64.
         fn visit_f64<E: serde::de::Error>(self, cells: f64) -> Result<u32, E> {
-            GRID.check(cells).map(|()| cells as u32).map_err(E::custom)
+            let whole = GRID.check(cells).map(|()| cells as u32);
+            whole.map_err(|_| E::invalid_value(Unexpected::Float(cells), &self))
         }
 
         fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<u32, E> {
-            parse_grid(word).map_err(E::custom)
+            parse_grid(word).map_err(|_| E::invalid_value(Unexpected::Str(word), &self))
         }
     }
     deserializer.deserialize_any(Grid)

@@ -55,7 +55,12 @@ pub fn value_fault(error: &str) -> String {
             format!("'{word}' is not known; it must be one of {}", words.collect::<Vec<_>>().join(", "))
         }
         Some(word) if error.starts_with("missing") => format!("'{word}' is missing"),
-        Some(word) => format!("'{word}' has the wrong type"),
+        Some(word) => match error.split_once(", expected ") {
+            Some((_, expected)) if error.starts_with("invalid value") => {
+                format!("'{word}' is given; it must be {}", escaped(expected))
+            }
+            _ => format!("'{word}' has the wrong type"),
+        },
         None if error.starts_with("invalid type: map, expected a sequence") => {
             "an object is given, but a list is expected".to_owned()
         }
@@ -128,6 +133,10 @@ mod tests {
             ),
             ("Error: missing field `to`", "'to' is missing"),
             ("invalid type: floating point `64.5`, expected u32", "'64.5' has the wrong type"),
+            (
+                "invalid value: floating point `64.5`, expected auto (0) or a whole number from 8 to 512",
+                "'64.5' is given; it must be auto (0) or a whole number from 8 to 512",
+            ),
             ("invalid type: map, expected a sequence", "an object is given, but a list is expected"),
             ("invalid length 0, expected an array of length 3", "a value has the wrong type"),
             ("duplicate field `vertex`", "'vertex' is given twice"),
