@@ -24,8 +24,9 @@ const MAX_SQUARED_DISTANCE: f64 = 1.5;
 /// hardly jump.
 const MIN_REENTRANT_SINE: f64 = 0.25;
 
-/// Components of a unit normal that are smaller than this are rounding errors.
-const NORMAL_TOLERANCE: f64 = 1e-9;
+/// Sine of the angle between a ray and a face from which on the face stops rays beside the edge like a steep wall.
+/// Nearly parallel faces count less, so that the share of a split ray does not hang on the sign of a rounding error.
+const STEEP: f64 = 0.25;
 
 /// Distance, in cells, within which a point is on an edge.
 pub(super) const EDGE_TOLERANCE: f64 = 1e-6;
@@ -38,9 +39,31 @@ struct Edge {
     facet: u32,
     /// Indices, 0 to 2, of the corners of `facet` at the edge's ends.
     corners: [usize; 2],
-    /// For each axis of a ray, the axis along which the edge is nearest to the ray. `None` if the edge's faces do not
-    /// stop rays along that axis.
-    across: [Option<usize>; 3],
+    /// For each axis of a ray, the axis along which the edge is nearest to the ray.
+    across: [usize; 3],
+    /// For each axis of a ray, the largest share of a ray that the edge splits off. It is 0 if the edge's faces stop no
+    /// rays along that axis, or stop those on both sides of the edge.
+    largest_share: [f64; 3],
+}
+
+impl Edge {
+    /// `normals`: unit normals of the two faces at the edge.
+    fn new(ends: [DVec3; 2], facet: u32, corners: [usize; 2], normals: [DVec3; 2]) -> Self {
+        let way = (ends[1] - ends[0]).normalize_or_zero();
+        // Of the two axes across the ray, choose the one along which the edge extends less.
+        let across = [0, 1, 2].map(|axis| {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            if way[u].abs() < way[v].abs() { u } else { v }
+        });
+        let largest_share = [0, 1, 2].map(|axis| {
+            let [a, b] = normals.map(|n| n[axis]);
+            let steepest = 1.0 - fade(a.abs().max(b.abs()) / STEEP);
+            // If both faces face the ray, it ends at one of them on either side of the edge.
+            let other = if a * b > 0.0 { fade(a.abs().min(b.abs()) / STEEP) } else { 1.0 };
+            steepest * other
+        });
+        Self { ends, facet, corners, across, largest_share }
+    }
 }
 
 /// Passage of a ray by an edge.
@@ -141,7 +164,10 @@ impl EdgeLists {
         let beyond = end.min(REACH);
         for &number in some {
             let edge = &self.edges[number as usize];
-            let Some(across) = edge.across[axis] else { continue };
+            if edge.largest_share[axis] == 0.0 {
+                continue;
+            }
+            let across = edge.across[axis];
             let [a, b] = edge.ends;
             let along = 3 - axis - across;
             // Beyond an end of the edge, the nearest point is that end, so the share fades with the distance from it.
@@ -159,7 +185,7 @@ impl EdgeLists {
                 (false, true) => 0.0,
                 (false, false) => fade((distance - end).max(0.0) / beyond),
             };
-            let share = fading * fade(apart / REACH);
+            let share = edge.largest_share[axis] * fading * fade(apart / REACH);
             if ahead && share > 0.0 {
                 let mut barycentric = [0.0; 3];
                 (barycentric[edge.corners[0]], barycentric[edge.corners[1]]) = (1.0 - s, s);
@@ -186,7 +212,7 @@ fn edge_of_sheet(lists: &TriangleLists, f: u32, k: usize) -> Edge {
     let triangle = lists.triangle(f);
     let ends = corners.map(|k| triangle.corners[k]);
     let normal = triangle.unit_normal();
-    Edge { ends, facet: f, corners, across: across(ends, [normal, -normal]) }
+    Edge::new(ends, f, corners, [normal, -normal])
 }
 
 /// The edge between two facets (each with the corner at which the edge starts), if it is re-entrant.
@@ -201,16 +227,5 @@ fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> O
     if sine < MIN_REENTRANT_SINE && (sine <= 0.0 || normals[0].dot(normals[1]) > 0.0) {
         return None;
     }
-    Some(Edge { ends, facet: f, corners, across: across(ends, normals) })
-}
-
-/// See [`Edge::across`].
-fn across(ends: [DVec3; 2], normals: [DVec3; 2]) -> [Option<usize>; 3] {
-    let way = (ends[1] - ends[0]).normalize_or_zero();
-    [0, 1, 2].map(|axis| {
-        let [a, b] = normals.map(|n| if n[axis].abs() < NORMAL_TOLERANCE { 0.0 } else { n[axis] });
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        // Of the two axes across the ray, choose the one along which the edge extends less.
-        (a * b <= 0.0 && (a, b) != (0.0, 0.0)).then_some(if way[u].abs() < way[v].abs() { u } else { v })
-    })
+    Some(Edge::new(ends, f, corners, normals))
 }
