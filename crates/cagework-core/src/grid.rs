@@ -6,7 +6,7 @@ use crate::mesh::Bounds;
 
 /// Offset of the cell centres, in cells. It is small and irregular, so that grid lines do not run along edges and
 /// vertices of axis-aligned cages.
-const SHIFT: DVec3 = DVec3::new(0.013_713_7, 0.007_071_1, 0.019_318_5);
+const SHIFT: DVec3 = DVec3::new(0.003_713_7, 0.002_071_1, 0.004_318_5);
 
 /// Value that stands for "no cell" or "no row" in tables of indices.
 pub const NO_CELL: u32 = u32::MAX;
@@ -29,9 +29,13 @@ impl Grid {
     pub fn cubic(bounds: Bounds, g: u32) -> Self {
         let (min, extent) = (bounds.min.as_dvec3(), bounds.extent().as_dvec3());
         let h = extent.max_element() / f64::from(g);
-        // Centres at -1/2, 1/2, ...: the first and the last layer lie outside the cage.
-        let dims = [0, 1, 2].map(|a| (extent[a] / h - SHIFT[a] + 0.5).ceil().max(1.0) as u32 + 1);
-        Self { dims, origin: min + h * (SHIFT - 0.5), cell: DVec3::splat(h) }
+        // The cells cover the cage symmetrically, so that a cage that is turned by 90 degrees or mirrored gets nearly the
+        // same centres.
+        let over = (extent / h).map(|x| 0.5 * ((x - 1e-9).ceil() - x).max(0.0));
+        // The first and the last layer of centres lie outside the cage.
+        let first = SHIFT - 0.5 - over;
+        let dims = [0, 1, 2].map(|a| (extent[a] / h - first[a]).ceil().max(1.0) as u32 + 1);
+        Self { dims, origin: min + h * first, cell: DVec3::splat(h) }
     }
 
     /// Returns the grid of every second centre along each axis: its cell (x, y, z) has the centre of this grid's cell
