@@ -133,9 +133,12 @@ impl NarrowPlaces {
         let step = tests.div_ceil(MAX_TESTS).max(1) as usize;
         let mut places = Vec::new();
         for (face, own) in (0..).zip(&of_face).step_by(step) {
-            for side in [Side::Inside, Side::Outside] {
-                let mut widths: Vec<(f64, DVec3)> =
-                    own.iter().flat_map(|own| widths(own, side, &triangles)).collect();
+            let mut of_sides = [Vec::new(), Vec::new()];
+            for [inside, outside] in own.iter().flat_map(|own| widths(own, &triangles)) {
+                of_sides[0].push(inside);
+                of_sides[1].push(outside);
+            }
+            for (side, mut widths) in [Side::Inside, Side::Outside].into_iter().zip(of_sides) {
                 widths.sort_by(|a, b| a.0.total_cmp(&b.0));
                 if let Some(&(width, middle)) = widths.get(widths.len() / 2)
                     && width.is_finite()
@@ -255,26 +258,32 @@ fn width_of(outline: &[DVec3]) -> f64 {
     edges.map(of_edge).fold(f64::INFINITY, f64::min)
 }
 
-/// Distances along rays from points of a triangle to the opposite triangle, with the point halfway; infinite where no
-/// triangle is opposite.
-fn widths(own: &Triangle, side: Side, triangles: &[Triangle]) -> [(f64, DVec3); RAY_ORIGINS.len()] {
+/// Distances along the normal from points of a triangle to the opposite triangle, inside and outside, each with the point
+/// halfway; infinite where no triangle is opposite.
+fn widths(own: &Triangle, triangles: &[Triangle]) -> [[(f64, DVec3); 2]; RAY_ORIGINS.len()] {
     let normal = own.cross.normalize_or_zero();
-    let way = if side == Side::Inside { -normal } else { normal };
+    let ways = [-normal, normal];
     RAY_ORIGINS.map(|shares| {
         let from = (0..3).map(|k| shares[k] * own.corners[k]).sum::<DVec3>();
-        let (mut width, mut facing) = (f64::INFINITY, DVec3::ZERO);
-        for triangle in triangles.iter().filter(|triangle| triangle.may_meet(from, way)) {
-            // Triangles that touch the ray's own are at distance 0. They bound no part and no gap.
-            if triangle.corners != own.corners
-                && let Some(distance) = distance_along(from, way, triangle.corners)
-                && distance > 0.0
-                && distance < width
-            {
-                (width, facing) = (distance, triangle.cross);
+        let mut nearest = [(f64::INFINITY, DVec3::ZERO); 2];
+        // Triangles that touch the ray's own are at distance 0. They bound no part and no gap.
+        let others =
+            triangles.iter().filter(|other| other.may_meet(from, normal) && other.corners != own.corners);
+        for triangle in others {
+            for (way, nearest) in ways.into_iter().zip(&mut nearest) {
+                if let Some(distance) = distance_along(from, way, triangle.corners)
+                    && distance > 0.0
+                    && distance < nearest.0
+                {
+                    *nearest = (distance, triangle.cross);
+                }
             }
         }
-        let is_opposite = normal.dot(facing.normalize_or_zero()) <= MAX_NORMAL_DOT;
-        if is_opposite { (width, from + 0.5 * width * way) } else { (f64::INFINITY, from) }
+        [0, 1].map(|side| {
+            let (width, facing) = nearest[side];
+            let is_opposite = normal.dot(facing.normalize_or_zero()) <= MAX_NORMAL_DOT;
+            if is_opposite { (width, from + 0.5 * width * ways[side]) } else { (f64::INFINITY, from) }
+        })
     })
 }
 

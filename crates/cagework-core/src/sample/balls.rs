@@ -62,12 +62,8 @@ impl<'a> Balls<'a> {
         if self.balls.is_empty() {
             return;
         }
-        let low = DVec3::from_array(low.map(f64::from));
-        self.blocks.near(low, low + 1.0, |index| {
-            if found.iter().all(|ball| ball.index != index) {
-                found.push(NearBall { index, sum: 0.0, of_nodes: 0.0 });
-            }
-        });
+        let near = self.blocks.near(DVec3::from_array(low.map(f64::from)));
+        found.extend(near.iter().map(|&index| NearBall { index, sum: 0.0, of_nodes: 0.0 }));
     }
 
     /// Adds an entry of a stencil, a node or a point of the surface at `p` (cell coordinates), to the interpolated `1/r`.

@@ -114,9 +114,8 @@ impl EdgeLists {
                 [] => None,
             })
             .collect();
-        let boxes =
-            edges.iter().map(|e| (e.ends[0].min(e.ends[1]) - REACH, e.ends[0].max(e.ends[1]) + REACH));
-        let blocks = Blocks::new(grid, boxes);
+        let blocks =
+            Blocks::new(grid, edges.iter().map(|e| (e.ends[0].min(e.ends[1]), e.ends[0].max(e.ends[1]))));
         Self { edges, blocks }
     }
 
@@ -128,14 +127,12 @@ impl EdgeLists {
         }
         let low = DVec3::from_array(low.map(f64::from));
         let middle = low + 0.5;
-        self.blocks.near(low, low + 1.0, |number| {
+        found.extend(self.blocks.near(low).iter().filter(|&&number| {
             let [a, b] = self.edges[number as usize].ends;
             let (way, to) = (b - a, middle - a);
             let s = (to.dot(way) / way.length_squared()).clamp(0.0, 1.0);
-            if (to - s * way).length_squared() < MAX_SQUARED_DISTANCE && !found.contains(&number) {
-                found.push(number);
-            }
-        });
+            (to - s * way).length_squared() < MAX_SQUARED_DISTANCE
+        }));
     }
 
     /// Distance, in cells and at most `limit`, from `p` to the nearest of the edges with the indices `some`.

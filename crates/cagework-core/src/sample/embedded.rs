@@ -29,7 +29,7 @@ use crate::voxelize::lines::Overlaps;
 use super::balls::{Balls, NearBall};
 use super::edges::{EDGE_TOLERANCE, EdgeLists, Passage, fade};
 use super::outside::OutsideSampler;
-use super::triangles::TriangleLists;
+use super::triangles::{NEAR, TriangleLists};
 use super::{Stencil, Stencils};
 
 /// Orders of the axes, averaged to avoid a preferred direction. All six orders would cost twice as much and change the
@@ -39,7 +39,7 @@ const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 /// Distance from the cage, in cells and in the maximum norm, at which trilinear interpolation starts to blend into the
 /// B-spline, and from which on the B-spline is used alone. At the first one, all 27 centres of the B-spline are inside
 /// the cage, and no wall is between them.
-const BLEND: [f64; 2] = [1.5, 2.0];
+const BLEND: [f64; 2] = [1.5, NEAR];
 
 /// Distance, in cells, up to which walls change the shares of the orders of the axes. With 1/2, weights on generated cages
 /// are less accurate.
@@ -81,7 +81,7 @@ pub struct Sampler<'a> {
 
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Facets in a box around the point.
+    /// Facets around the point.
     around: Vec<u32>,
     /// Facets in the current cube.
     near: Vec<u32>,
@@ -186,13 +186,16 @@ impl<'a> Sampler<'a> {
             return false;
         }
         let low = p.floor().to_array().map(|x| x as u32);
-        self.lists.in_cube(low, &mut scratch.near);
+        self.lists.around(p, &mut scratch.around);
+        let lowest = DVec3::from_array(low.map(f64::from));
+        scratch.near.clear();
+        scratch.near.extend(self.lists.of_box(&scratch.around, [lowest, lowest + 1.0]));
         self.edges.in_cube(low, &mut scratch.edges);
         self.balls.near(low, &mut scratch.balls);
         // Outside the cage, the centres of the B-spline may lie outside the grid.
         let is_inside = self.level.row_of[grid.index(p.round().to_array().map(|x| x as u32))] != NO_CELL;
         let may_be_far = is_inside && scratch.near.is_empty();
-        let of_spline = if may_be_far { self.of_spline(p, &mut scratch.around) } else { 0.0 };
+        let of_spline = if may_be_far { self.of_spline(p, &scratch.around) } else { 0.0 };
         if of_spline > 0.0 {
             self.quadratic(p, of_spline, scratch);
         }
@@ -250,9 +253,8 @@ impl<'a> Sampler<'a> {
     ///
     /// Whether a ray meets a wall changes abruptly at a re-entrant edge. Walls further away than such an edge therefore do
     /// not count, which makes the shares continuous.
-    fn shares(&self, p: DVec3, scratch: &mut Scratch) -> [f64; 3] {
-        self.lists.in_box(p - WALL_RANGE, p + WALL_RANGE, &mut scratch.around);
-        if scratch.around.is_empty() {
+    fn shares(&self, p: DVec3, scratch: &Scratch) -> [f64; 3] {
+        if self.lists.of_box(&scratch.around, [p - WALL_RANGE, p + WALL_RANGE]).next().is_none() {
             return [1.0 / 3.0; 3];
         }
         let range = self.edges.distance(&scratch.edges, p, WALL_RANGE);
@@ -267,10 +269,9 @@ impl<'a> Sampler<'a> {
     }
 
     /// Weight of the B-spline at `p`.
-    fn of_spline(&self, p: DVec3, around: &mut Vec<u32>) -> f64 {
-        self.lists.in_box(p - BLEND[1], p + BLEND[1], around);
+    fn of_spline(&self, p: DVec3, around: &[u32]) -> f64 {
         let mut distance = BLEND[1];
-        for &number in &*around {
+        for &number in around {
             distance = distance.min(self.lists.triangle(number).max_norm_distance(p));
             if distance <= BLEND[0] {
                 return 0.0;
@@ -279,7 +280,8 @@ impl<'a> Sampler<'a> {
         1.0 - fade((distance - BLEND[0]) / (BLEND[1] - BLEND[0]))
     }
 
-    /// Interpolates by the uniform quadratic B-spline of the 27 centres around the centre nearest to `p`.
+    /// Interpolates by the uniform quadratic B-spline of the 27 centres around the centre nearest to `p`, all of which are
+    /// inside the cage. The stencil must be empty.
     fn quadratic(&self, p: DVec3, weight: f64, scratch: &mut Scratch) {
         let nearest = p.round();
         let f = p - nearest;
@@ -287,11 +289,18 @@ impl<'a> Sampler<'a> {
         let outer = [f, -f].map(|f| 0.5 * (0.5 - f) * (0.5 - f));
         let weights = [outer[0], 1.0 - outer[0] - outer[1], outer[1]];
         let low = (nearest - 1.0).to_array().map(|x| x as u32);
+        let Scratch { stencil, balls, .. } = scratch;
         for z in 0..3u32 {
             for y in 0..3u32 {
-                for x in 0..3u32 {
-                    let share = weights[x as usize].x * weights[y as usize].y * weights[z as usize].z;
-                    self.add_centre(low, [x, y, z], weight * share, scratch);
+                let of_line = weight * weights[y as usize].y * weights[z as usize].z;
+                let row = self.level.grid.index([low[0], low[1] + y, low[2] + z]);
+                for (x, weights) in weights.iter().enumerate() {
+                    let share = of_line * weights.x;
+                    stencil.add_new_node(self.level.row_of[row + x], share);
+                    if !balls.is_empty() {
+                        let cell = [low[0] + x as u32, low[1] + y, low[2] + z];
+                        self.balls.add(balls, DVec3::from_array(cell.map(f64::from)), share, true);
+                    }
                 }
             }
         }

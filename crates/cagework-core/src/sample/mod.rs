@@ -65,6 +65,11 @@ impl Stencil {
         accumulate(&mut self.nodes, row, weight);
     }
 
+    /// Adds the entry of a row of the field that has none yet, without searching for it.
+    pub fn add_new_node(&mut self, row: u32, weight: f64) {
+        self.nodes.push((row, weight));
+    }
+
     /// Adds `weight` to the entry of a control's Dirichlet value.
     pub fn add_hat(&mut self, column: u32, weight: f64) {
         accumulate(&mut self.hats, column, weight);

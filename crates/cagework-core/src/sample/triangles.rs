@@ -5,9 +5,12 @@ use glam::DVec3;
 use crate::cage::Cage;
 use crate::grid::Grid;
 
-/// Number of cells along a block's side. The list of a block is filtered for each cell, so it may contain boxes that do
-/// not meet the cell.
-const BLOCK: u32 = 8;
+/// Number of cells along a block's side. The list of a block is filtered for each point, so it may contain boxes that
+/// are not near the point.
+const BLOCK: u32 = 4;
+
+/// Largest distance, in cells and in the maximum norm, from a point to the boxes that are near it.
+pub const NEAR: f64 = 2.0;
 
 /// Tolerance of the overlap tests, in cells, against rounding of cell coordinates (up to 512 in f64).
 const TOLERANCE: f64 = 1e-9;
@@ -22,7 +25,7 @@ pub struct CellTriangle {
     normal: DVec3,
 }
 
-/// For each block of `BLOCK`^3 cells, the indices of the boxes that meet the block.
+/// For each block of `BLOCK`^3 cells, the indices of the boxes at most [`NEAR`] cells away.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     n_blocks: [u32; 3],
@@ -53,6 +56,7 @@ impl Blocks {
 
     fn each(&self, boxes: impl Iterator<Item = (DVec3, DVec3)>, mut each: impl FnMut(usize, u32)) {
         for (number, (low, high)) in boxes.enumerate() {
+            let (low, high) = (low - NEAR, high + NEAR);
             let block = |x: f64, axis: usize| {
                 ((x / f64::from(BLOCK)).floor().max(0.0) as u32).min(self.n_blocks[axis] - 1)
             };
@@ -70,21 +74,13 @@ impl Blocks {
         ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
     }
 
-    /// Calls `found` for every box that may meet the box between `low` and `high`. May call it several times for the
-    /// same box.
+    /// Indices of all boxes at most [`NEAR`] cells away from `at` in the maximum norm, and of some others, in ascending
+    /// order.
     #[inline]
-    pub fn near(&self, low: DVec3, high: DVec3, mut found: impl FnMut(u32)) {
-        let [first, last] = [low, high].map(|at| at.to_array().map(|x| x.max(0.0) as u32 / BLOCK));
-        for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
-            for y in first[1]..=last[1].min(self.n_blocks[1] - 1) {
-                for x in first[0]..=last[0].min(self.n_blocks[0] - 1) {
-                    let block = self.index([x, y, z]);
-                    for &number in &self.list[self.start[block] as usize..self.start[block + 1] as usize] {
-                        found(number);
-                    }
-                }
-            }
-        }
+    pub fn near(&self, at: DVec3) -> &[u32] {
+        let block = [0, 1, 2].map(|a| (at[a].max(0.0) as u32 / BLOCK).min(self.n_blocks[a] - 1));
+        let index = self.index(block);
+        &self.list[self.start[index] as usize..self.start[index + 1] as usize]
     }
 
     /// Size in bytes.
@@ -124,20 +120,26 @@ impl TriangleLists {
         Self { triangles, blocks }
     }
 
-    /// Triangles that may meet the box between `low` and `high`: all that do, and possibly some others.
-    pub fn in_box(&self, low: DVec3, high: DVec3, found: &mut Vec<u32>) {
-        found.clear();
-        self.blocks.near(low, high, |number| {
-            if self.triangle(number).meets(low, high) && !found.contains(&number) {
-                found.push(number);
-            }
-        });
+    /// Triangles that may meet the cube of half side [`NEAR`] around `p`: all that do, and possibly some others.
+    pub fn around(&self, p: DVec3, found: &mut Vec<u32>) {
+        self.in_box(p, [p - NEAR, p + NEAR], found);
+    }
+
+    /// Those of the triangles `some` that may meet a box (lowest and highest corner).
+    pub fn of_box<'a>(&'a self, some: &'a [u32], [low, high]: [DVec3; 2]) -> impl Iterator<Item = u32> + 'a {
+        some.iter().copied().filter(move |&number| self.triangle(number).meets(low, high))
     }
 
     /// Triangles that may meet the cube between centre `low` and centre `low + 1`.
     pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
         let low = DVec3::from_array(low.map(f64::from));
-        self.in_box(low, low + 1.0, found);
+        self.in_box(low, [low, low + 1.0], found);
+    }
+
+    /// Triangles that may meet a box (lowest and highest corner) all of whose points are near `at`.
+    fn in_box(&self, at: DVec3, [low, high]: [DVec3; 2], found: &mut Vec<u32>) {
+        found.clear();
+        found.extend(self.of_box(self.blocks.near(at), [low, high]));
     }
 
     /// All triangles, in the order of the cage's facets.
