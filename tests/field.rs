@@ -141,7 +141,7 @@ fn field_and_gradient_match_points_that_are_bound() {
     let [at_half, at_most] = quantiles(&mut errors);
     let [gradient_at_half, gradient_at_most] = quantiles(&mut gradient_errors);
     println!("{at_half} {at_most} {gradient_at_half} {gradient_at_most}");
-    assert!(at_half <= 2e-5 && at_most <= 2e-4, "position: {at_half} {at_most}");
+    assert!(at_half <= 3e-5 && at_most <= 2e-4, "position: {at_half} {at_most}");
     assert!(
         gradient_at_half <= 0.003 && gradient_at_most <= 0.02,
         "gradient: {gradient_at_half} {gradient_at_most}"

@@ -121,18 +121,20 @@ fn only_harmonic_coordinates_leave_the_upper_jaw_and_green_keeps_details() {
     assert!(green < harmonic.min(mean), "{green} {harmonic} {mean}");
 }
 
-/// At g = 320, folds converge to 0.0361 for the smooth and 0.0487 for the plain cage, a ratio of 0.74.
+/// At g = 320, folds converge to 0.0361 for the smooth and 0.0487 for the plain cage, a ratio of 0.74. Both are bound with
+/// 96 cells, which the plain cage gets by default; with 64, the smooth cage's fold is 0.0411.
 #[test]
 fn smooth_cage_avoids_sharp_folds() {
     let (clamp, cage) = sample("clamp");
     let (rest, posed) = (&clamp.mesh.positions, &clamp.poses[0].1);
     let folds = |smooth| {
         let set = ControlSet::new(&cage, smooth, InnerControls::default()).unwrap();
-        let binding = bind(rest, &set, &BindOptions::default(), &NoProgress).unwrap();
+        let options = BindOptions { grid: 96, ..BindOptions::default() };
+        let binding = bind(rest, &set, &options, &NoProgress).unwrap();
         sharpest_fold(&clamp.mesh.triangles, rest, &deform_bound(&binding.weights, &binding.frames, posed))
     };
     let (plain, smooth) = (folds(0), folds(2));
-    assert!(smooth < 0.8 * plain, "{smooth} {plain}");
+    assert!(smooth < 0.77 * plain, "{smooth} {plain}");
     assert!((plain / 0.0487 - 1.0).abs() < 0.02, "{plain}");
 }
 
