@@ -398,9 +398,9 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
 }
 
 /// At the tip of a spike, at the corners of a sheet and at the vertices of a generated cage, where re-entrant edges end,
-/// weights jump by at most 8e-3 at g = 64 (2e-2 for the generated cage, whose corners are sharper), and by more at g = 32
-/// unless both jumps are below 1e-3. (The sampler blends the values of rays that hit an edge and rays that miss it. The
-/// test fails if it does not do so just beyond the end of an edge.)
+/// weights jump by at most 3e-3 at g = 64, and by more at g = 32 unless both jumps are below 1e-3. (The sampler blends the
+/// values of rays that hit an edge and rays that miss it. The test fails if it does not do so just beyond the end of an
+/// edge.)
 #[test]
 fn weights_do_not_jump_where_re_entrant_edges_end() {
     let tip = Vec3::new(0.05, 0.03, -0.3);
@@ -426,10 +426,10 @@ fn weights_do_not_jump_where_re_entrant_edges_end() {
         .cage;
     let vertices = generated.positions().to_vec();
     let generated = ControlSet::new(&generated, 0, InnerControls::default()).unwrap();
-    let cases = [(spike, vec![tip], 8e-3), (sheet, corners.to_vec(), 8e-3), (generated, vertices, 2e-2)];
-    for (set, corners, limit) in cases {
+    let cases = [(spike, vec![tip]), (sheet, corners.to_vec()), (generated, vertices)];
+    for (set, corners) in cases {
         let [coarse, fine] = [32, 64].map(|grid| largest_jump(&set, &corners, grid));
         println!("jumps of {coarse} at g = 32, {fine} at g = 64");
-        assert!(fine <= limit && fine < coarse.max(1e-3), "{coarse} at g = 32, {fine} at g = 64");
+        assert!(fine <= 3e-3 && fine < coarse.max(1e-3), "{coarse} at g = 32, {fine} at g = 64");
     }
 }

@@ -16,6 +16,11 @@ pub(super) const MIN_FACE_HEIGHT: f64 = 1e-7;
 /// this. This distance bounds the rest error on the face.
 pub(super) const PLANE_TOLERANCE: f64 = 2e-6;
 
+/// Distance of the corners from the face's plane, as a fraction of the cage's diagonal, from which on hats are linear on
+/// the facets of the patch. Between [`PLANE_TOLERANCE`] and this, they blend into the coordinates of the outline, so that
+/// they are continuous in the corners.
+const FACETED: f64 = 1e-4;
+
 /// Smallest sine of the exterior angle at the corners of an outline that counts as convex.
 const MIN_CONVEX_SINE: f64 = 1e-3;
 
@@ -45,6 +50,9 @@ pub(super) struct Polygon {
     pub(super) facets: Vec<[u32; 3]>,
     /// Hats at the inner points of the patch. `[n_inner][n_corners]`
     pub(super) inner: Vec<Vec<f64>>,
+    /// Share of the hats that is linear on each facet of the patch, 0 to 1. Only linear hats reproduce the points of
+    /// facets.
+    faceted: f64,
 }
 
 impl Polygon {
@@ -89,7 +97,8 @@ impl Polygon {
             (true, false) => patch::fans(&outline, &triangles),
         };
         let meyer = if n == 4 { meyer_share(&outline) } else { 0.0 };
-        let mut polygon = Self { outline, meyer, triangles, facets, inner: Vec::new() };
+        let faceted = ((height / diagonal - PLANE_TOLERANCE) / (FACETED - PLANE_TOLERANCE)).clamp(0.0, 1.0);
+        let mut polygon = Self { outline, meyer, triangles, facets, inner: Vec::new(), faceted };
         for &point in &points {
             let mut hats = vec![0.0; n];
             polygon.values(point, &mut hats);
@@ -101,7 +110,30 @@ impl Polygon {
 
     fn linear(triangles: Vec<[u32; 3]>) -> Self {
         let facets = triangles.clone();
-        Self { outline: Vec::new(), meyer: 0.0, facets, triangles, inner: Vec::new() }
+        Self { outline: Vec::new(), meyer: 0.0, facets, triangles, inner: Vec::new(), faceted: 0.0 }
+    }
+
+    /// Computes the hats of the corners at a point of a facet, non-negative. `values`: `[n_corners]`, zero on entry.
+    pub(super) fn values_on(&self, facet: usize, barycentric: [f64; 3], values: &mut [f64]) {
+        let corners = self.facets[facet];
+        if self.faceted < 1.0 {
+            let points = corners.map(|k| self.outline[k as usize]);
+            self.values(points.iter().zip(barycentric).map(|(&p, b)| b * p).sum(), values);
+        }
+        if self.faceted > 0.0 {
+            values.iter_mut().for_each(|value| *value *= 1.0 - self.faceted);
+            for (k, b) in corners.into_iter().zip(barycentric) {
+                let share = self.faceted * b;
+                match (k as usize).checked_sub(values.len()) {
+                    None => values[k as usize] += share,
+                    Some(inner) => {
+                        for (value, hat) in values.iter_mut().zip(&self.inner[inner]) {
+                            *value += share * hat;
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Computes the hats of the corners at a point of the plane, non-negative. `values`: `[n_corners]`, zero on entry.

@@ -1,6 +1,6 @@
 //! Tests that hats are barycentric coordinates on every kind of face.
 
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 use proptest::prelude::*;
 
 use super::shapes::*;
