@@ -2,8 +2,8 @@
 //!
 //! Over each point of the face's best-fitting plane, the patch is `sum hat_k c_k`, where `hat_k` are the planar
 //! coordinates of the projected outline and `c_k` the corners in space. Values on a face therefore depend continuously
-//! on its corners, whether flat or bent, and reproduce the patch. The patch over a parallelogram is bilinear. Each
-//! patch is cut into *facets* along rings around its centre. The sides of the face are not divided, so that
+//! on its corners, whether flat or bent. The patch over a parallelogram is bilinear. Each patch is cut into *facets* along
+//! rings around its centre, on which points and values are linear. The sides of the face are not divided, so that
 //! neighbouring faces meet without gaps.
 
 use glam::DVec2;

@@ -5,6 +5,9 @@ use proptest::prelude::*;
 
 use super::shapes::*;
 use super::*;
+use crate::bind::bind;
+use crate::options::BindOptions;
+use crate::progress::NoProgress;
 
 /// Tolerance for f64 rounding of coordinates of size 1 after a few dozen operations.
 const ROUNDING: f64 = 1e-12;
@@ -48,27 +51,44 @@ fn hats_reproduce_points_on_every_kind_of_face() {
     }
 }
 
-/// The facets of a bent face deviate from its patch by at most 2 % of the bend, which is the distance of corner 7 from
-/// the planes through the other corners of its faces.
 #[test]
-fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
-    for by in [0.5, 0.01, 1e-4] {
+fn hats_reproduce_points_on_bent_faces() {
+    for (by, tolerance) in [(0.5, ROUNDING), (0.01, ROUNDING), (1e-4, 2e-6)] {
         let mut mesh = cube();
         mesh.positions[7] += Vec3::splat(by);
-        assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.02 * f64::from(by));
+        assert_linear_reproduction(&Cage::new(&mesh).unwrap(), tolerance);
     }
-    // The facets of a bent pentagon are wider, and those of a bent concave face larger, so their tolerances are 4 % and
-    // 8 %.
     let pentagon: Vec<[f32; 2]> =
         (0..5).map(|k| (k as f32 * std::f32::consts::TAU / 5.0).sin_cos()).map(|(y, x)| [x, y]).collect();
     let mut mesh = prism(&pentagon, 1.0);
     mesh.positions[7].z += 0.1;
     let cage = Cage::new(&mesh).unwrap();
     assert!(cage.facets().len() > cage.triangles().len());
-    assert_linear_reproduction(&cage, 0.04 * 0.1);
+    assert_linear_reproduction(&cage, ROUNDING);
     let mut mesh = prism(&[[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.0, 2.0]], 1.0);
     mesh.positions[7].z += 0.1;
-    assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.08 * 0.1);
+    assert_linear_reproduction(&Cage::new(&mesh).unwrap(), ROUNDING);
+}
+
+/// As a corner leaves the plane of its faces, hats change gradually from the coordinates of the outline to linear ones.
+#[test]
+fn hats_are_continuous_in_the_bend() {
+    let of = |bend: f32| {
+        let mut mesh = cube();
+        mesh.positions[7] += Vec3::splat(bend);
+        let cage = Cage::new(&mesh).unwrap();
+        // A flat face has other facets: compare at points, by the weights of a bind right behind the face.
+        let points = [Vec3::new(0.3, 0.61, 1.0 - 1e-6), Vec3::new(0.72, 0.55, 1.0 - 1e-6)];
+        let options = BindOptions { grid: 8, ..BindOptions::default() };
+        let weights = bind(&points, &cage, &options, &NoProgress).unwrap().weights;
+        (0..8).flat_map(|c| weights.column(c).collect::<Vec<_>>()).collect::<Vec<f32>>()
+    };
+    // The plane's tolerance is passed at a bend of about 1.4e-5, the end of the blend at 7e-4.
+    for bend in [1e-5, 2e-5, 1e-4, 6.9e-4] {
+        let [before, after] = [bend, bend + 5e-6].map(of);
+        let change = before.iter().zip(&after).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(change < 5e-4, "{change} at a bend of {bend}");
+    }
 }
 
 /// A cube with one corner pulled out: three quads are not planar.
