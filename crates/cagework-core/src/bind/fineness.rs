@@ -14,6 +14,10 @@ pub const ROUGH_GRID: u32 = AUTO_GRIDS[0];
 /// to 45 % had a weight off by more than 0.01 with 64 cells. With this choice it is 0 to 4 %.
 const CELLS_PER_PLACE: f64 = 4.0;
 
+/// Finest grid that the automatic choice takes for places that the finest of [`AUTO_GRIDS`] does not resolve: parts or
+/// faces narrower than a cell. Of 260 generated cages, 5 have such places, and 204 to 296 cells resolve them.
+const MAX_RESOLVING_GRID: u32 = 320;
+
 /// Limit on the work of a solve in an automatic grid above the coarsest, in updates of single values: about 10 s on one
 /// core. A grid of 192 cells stays below it with up to 250 columns if a third of its cells are inside the cage.
 const MAX_UPDATES: f64 = 1e10;
@@ -27,13 +31,19 @@ pub struct GridChoice {
     pub reason: Option<String>,
 }
 
-/// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide, or the finest.
+/// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide. If none is, the finest,
+/// or the number of cells above it that resolves all places, up to [`MAX_RESOLVING_GRID`].
 #[must_use]
 pub fn wanted_cells(places: &NarrowPlaces) -> u32 {
     let [.., finest] = AUTO_GRIDS;
-    let Some(narrowest) = places.narrowest() else { return AUTO_GRIDS[0] };
-    let is_fine = |&cells: &u32| narrowest.width >= CELLS_PER_PLACE * places.cell(cells);
-    AUTO_GRIDS.into_iter().find(is_fine).unwrap_or(finest)
+    let width = places.narrowest().map_or(f64::INFINITY, |place| place.width);
+    let is_fine = |cells: u32| width >= CELLS_PER_PLACE * places.cell(cells);
+    let cells = AUTO_GRIDS.into_iter().find(|&cells| is_fine(cells)).unwrap_or(finest);
+    let resolving = places.unresolved(cells).and_then(|unresolved| unresolved.cells);
+    resolving.map_or(cells, |wanted| {
+        let listed = AUTO_GRIDS.into_iter().find(|&cells| cells >= wanted);
+        listed.unwrap_or(if wanted <= MAX_RESOLVING_GRID { wanted } else { cells })
+    })
 }
 
 /// Chooses the grid of a bind: the number of the options, or with [`AUTO_GRID`] the number of [`wanted_cells`]. `fits`:
@@ -53,7 +63,8 @@ pub(crate) fn choose(
         return GridChoice { cells: AUTO_GRIDS[0], reason: None };
     }
     let wanted = wanted_cells(places);
-    let allowed = AUTO_GRIDS.into_iter().rev().filter(|&cells| cells <= wanted);
+    let listed = AUTO_GRIDS.into_iter().rev().filter(|&cells| cells < wanted);
+    let allowed = std::iter::once(wanted).chain(listed);
     let with = |cells| BindOptions { grid: cells, ..*options };
     let is_quick = |&cells: &u32| cells == AUTO_GRIDS[0] || updates(&with(cells)) <= MAX_UPDATES;
     let quick = allowed.clone().find(is_quick).unwrap_or(AUTO_GRIDS[0]);
@@ -83,6 +94,7 @@ mod tests {
 
     use super::*;
     use crate::bind::{bind, choose_grid, estimate_memory};
+    use crate::cage::shapes::cuboid;
     use crate::cage::{Cage, subdivided_box};
     use crate::mesh::Bounds;
     use crate::progress::NoProgress;
@@ -98,6 +110,11 @@ mod tests {
         for (thickness, cells) in expected {
             let choice = choose_grid(&plate(thickness), &BindOptions::default()).unwrap();
             assert_eq!(choice.cells, cells, "{thickness}: {choice:?}");
+        }
+        // 1 / 0.0041 is 243.9, and 1 / 0.003 is above the limit of 320.
+        for (thickness, cells) in [(0.0041, 244), (0.003, 192)] {
+            let cage = Cage::new(&cuboid(Vec3::ZERO, vec3(1.0, 0.3, thickness))).unwrap();
+            assert_eq!(choose_grid(&cage, &BindOptions::default()).unwrap().cells, cells, "{thickness}");
         }
         let fixed = BindOptions { grid: 20, ..BindOptions::default() };
         assert_eq!(choose_grid(&plate(0.001), &fixed).unwrap(), GridChoice { cells: 20, reason: None });
