@@ -212,7 +212,7 @@ pub struct Slider {
 pub const GRID: Number = Number {
     name: "grid",
     help: "Cells along the longest side of the cage; auto takes 64, 96, 128 or 192, so that the narrowest part and gap \
-           are four cells wide if possible",
+           are four cells wide if possible, or up to 320 if fewer do not resolve the cage",
     unit: "cells",
     allowed: "auto (0) or a whole number from 8 to 512",
     is_allowed: |g| {

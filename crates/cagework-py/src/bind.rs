@@ -36,7 +36,8 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// cage. If points are outside, or near controls inside the cage, it also has offsets (csr_array) and frames, which deform uses.
 ///
 /// Options, as for `cagework bind`: grid="auto" (cells along the longest side: 64, 96, 128 or 192, so that the narrowest part
-/// and gap of the cage are four cells wide if possible; or a number from 8 to 512), method="embedded" or "classic",
+/// and gap of the cage are four cells wide if possible, or up to 320 if fewer do not resolve the cage; or a number from 8
+/// to 512), method="embedded" or "classic",
 /// solver="multigrid", "jacobi" or "cg", preconditioner="none" or "v_cycle", cell_shape="box" or "cubic",
 /// delta_norm="euclidean" or "literal", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
 /// (bytes), outside="extend", "stay" or "refuse".

@@ -166,8 +166,7 @@ pub fn estimate_memory<'a>(
 }
 
 /// Chooses the grid of a bind, as [`bind`] does if memory suffices: the number of the options, or with
-/// [`AUTO_GRID`](crate::options::AUTO_GRID) the coarsest of [`fineness::AUTO_GRIDS`] in which the narrowest part and gap of
-/// the cage are four cells wide, unless the solve would take long.
+/// [`AUTO_GRID`](crate::options::AUTO_GRID) the number of [`fineness::wanted_cells`], unless the solve would take long.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.
