@@ -479,7 +479,7 @@ mod tests {
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
         assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());
-        assert!(GRID.about().ends_with("if possible: auto (0) or a whole number from 8 to 512"));
+        assert!(GRID.about().ends_with("resolve the cage: auto (0) or a whole number from 8 to 512"));
         let sparse = BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().unwrap_err();
         assert_eq!(
             sparse.to_string(),
