@@ -32,7 +32,7 @@ pub struct GridChoice {
 }
 
 /// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide. If none is, the finest,
-/// or the number of cells above it that resolves all places, up to [`MAX_RESOLVING_GRID`].
+/// or the number of cells above it that resolves all places, up to 320.
 #[must_use]
 pub fn wanted_cells(places: &NarrowPlaces) -> u32 {
     let [.., finest] = AUTO_GRIDS;
