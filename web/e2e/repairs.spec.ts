@@ -107,20 +107,20 @@ test("every fault has a button that repairs it", async ({ page }) => {
   }
 
   await test.step("a cage thinner than a cell", async () => {
-    const flat = boxFaces([1, 1, 1 / 256]);
-    await show(page, { cage: flat, model: [0.8, 0.8, 0.003] });
+    const flat = boxFaces([1, 1, 1 / 512]);
+    await show(page, { cage: flat, model: [0.8, 0.8, 0.0015] });
     await bound(page);
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const card = panel.locator(".problem-card").filter({ hasText: /thinner than a cell/ });
-    // The part is 2 long and 2/256 thick, one cell at a grid of 256; the automatic grid has at most 192 cells. (Powers of two
+    // The part is 2 long and 2/512 thick, one cell at a grid of 512; the automatic grid has at most 320. (Powers of two
     // are exact in OBJ files and f32.)
-    await card.getByRole("button", { name: /Bind with 256 cells/ }).click();
+    await card.getByRole("button", { name: /Bind with 512 cells/ }).click();
     await expect(card.getByText("Fine enough")).toBeVisible();
     await bound(page);
     await page.getByRole("button", { name: "Bind", exact: false }).first().click();
     await expect(
       panel
-        .getByText(/\b256\b/)
+        .getByText(/\b512\b/)
         .filter({ visible: true })
         .first(),
     ).toBeVisible();
