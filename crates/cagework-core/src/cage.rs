@@ -280,8 +280,9 @@ impl Cage {
     /// a rectangle), blended with pseudo-harmonic coordinates if a corner is nearly straight. On all other planar
     /// polygons they are pseudo-harmonic coordinates (after Gordon and Wixom 1974: means over the chords through the
     /// point), which depend continuously on the corners. A bent face is a patch over its best-fitting plane, with the
-    /// coordinates of its projected outline at the corners of facets, linear in between; if that outline crosses itself or a side of it vanishes, hats are linear
-    /// on the triangles of the face. All hats are non-negative and linear along edges, so neighbouring faces agree.
+    /// coordinates of its projected outline at the corners of facets, linear in between; if that outline crosses
+    /// itself or a side of it vanishes, hats are linear on the triangles of the face. All hats are non-negative and
+    /// linear along edges, so neighbouring faces agree.
     ///
     /// # Panics
     /// If there is no such facet.

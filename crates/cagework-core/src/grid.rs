@@ -31,6 +31,7 @@ impl Grid {
         let h = extent.max_element() / f64::from(g);
         // The cells cover the cage symmetrically, so that a cage that is turned by 90 degrees or mirrored gets nearly the
         // same centres.
+        // A side of whole cells can come out a rounding error longer.
         let over = (extent / h).map(|x| 0.5 * ((x - 1e-9).ceil() - x).max(0.0));
         // The first and the last layer of centres lie outside the cage.
         let first = SHIFT - 0.5 - over;

@@ -14,8 +14,8 @@ pub const ROUGH_GRID: u32 = AUTO_GRIDS[0];
 /// to 45 % had a weight off by more than 0.01 with 64 cells. With this choice it is 0 to 4 %.
 const CELLS_PER_PLACE: f64 = 4.0;
 
-/// Finest grid that the automatic choice takes for places that the finest of [`AUTO_GRIDS`] does not resolve: parts or
-/// faces narrower than a cell. Of 260 generated cages, 5 have such places, and 204 to 296 cells resolve them.
+/// Finest grid that the automatic choice takes for places narrower than a cell of the finest of [`AUTO_GRIDS`]. Of 260
+/// generated cages, 5 have such places, and 204 to 296 cells resolve them.
 const MAX_RESOLVING_GRID: u32 = 320;
 
 /// Limit on the work of a solve in an automatic grid above the coarsest, in updates of single values: about 10 s on one
@@ -31,14 +31,20 @@ pub struct GridChoice {
     pub reason: Option<String>,
 }
 
-/// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide. If none is, the finest,
-/// or the number of cells above it that resolves all places, up to 320.
+/// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide, or the finest.
+fn cells_for_narrowest(places: &NarrowPlaces) -> u32 {
+    let [.., finest] = AUTO_GRIDS;
+    let Some(narrowest) = places.narrowest() else { return AUTO_GRIDS[0] };
+    let is_fine = |&cells: &u32| narrowest.width >= CELLS_PER_PLACE * places.cell(cells);
+    AUTO_GRIDS.into_iter().find(is_fine).unwrap_or(finest)
+}
+
+/// The coarsest of [`AUTO_GRIDS`] in which the narrowest part and gap of a cage are four cells wide, or the finest. If this
+/// does not resolve the cage ([`NarrowPlaces::unresolved`]), the coarsest of them that does, or a number above them, up to
+/// 320, that does.
 #[must_use]
 pub fn wanted_cells(places: &NarrowPlaces) -> u32 {
-    let [.., finest] = AUTO_GRIDS;
-    let width = places.narrowest().map_or(f64::INFINITY, |place| place.width);
-    let is_fine = |cells: u32| width >= CELLS_PER_PLACE * places.cell(cells);
-    let cells = AUTO_GRIDS.into_iter().find(|&cells| is_fine(cells)).unwrap_or(finest);
+    let cells = cells_for_narrowest(places);
     let resolving = places.unresolved(cells).and_then(|unresolved| unresolved.cells);
     resolving.map_or(cells, |wanted| {
         let listed = AUTO_GRIDS.into_iter().find(|&cells| cells >= wanted);
@@ -83,6 +89,10 @@ pub(crate) fn choose(
         } else {
             String::new()
         };
+        let coarser = cells_for_narrowest(places);
+        if coarser < cells {
+            return format!("With {coarser} cells, parts or faces of the cage would be narrower than a cell{limit}.");
+        }
         format!("The cage's {what} is {:.1} cells wide{limit}.", place.width / places.cell(cells))
     });
     GridChoice { cells, reason }
@@ -114,7 +124,9 @@ mod tests {
         // 1 / 0.0041 is 243.9, and 1 / 0.003 is above the limit of 320.
         for (thickness, cells) in [(0.0041, 244), (0.003, 192)] {
             let cage = Cage::new(&cuboid(Vec3::ZERO, vec3(1.0, 0.3, thickness))).unwrap();
-            assert_eq!(choose_grid(&cage, &BindOptions::default()).unwrap().cells, cells, "{thickness}");
+            let choice = choose_grid(&cage, &BindOptions::default()).unwrap();
+            assert_eq!(choice.cells, cells, "{thickness}");
+            assert_eq!(choice.reason.unwrap().contains("With 192 cells"), cells > 192);
         }
         let fixed = BindOptions { grid: 20, ..BindOptions::default() };
         assert_eq!(choose_grid(&plate(0.001), &fixed).unwrap(), GridChoice { cells: 20, reason: None });
