@@ -11,6 +11,8 @@ pub struct Joint {
     pub parent: Option<u32>,
     /// Position at rest, object units.
     pub at: Vec3,
+    /// Humanoid bone that the file's VRM data gives the joint, such as "leftUpperLeg".
+    pub bone: Option<String>,
 }
 
 /// The joints of a rigged model and their influences on its vertices.
@@ -67,8 +69,12 @@ mod tests {
     use super::*;
 
     fn rig(names: &[(&str, Option<u32>)], influences: &[(u32, f32)]) -> Rig {
-        let joint =
-            |(name, parent): &(&str, _)| Joint { name: (*name).into(), parent: *parent, at: Vec3::ZERO };
+        let joint = |(name, parent): &(&str, _)| Joint {
+            name: (*name).into(),
+            parent: *parent,
+            at: Vec3::ZERO,
+            bone: None,
+        };
         Rig {
             joints: names.iter().map(joint).collect(),
             first: (0..=influences.len() as u32).collect(),

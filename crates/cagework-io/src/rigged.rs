@@ -93,8 +93,8 @@ impl Model {
         Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.joints()))
     }
 
-    /// Returns the joints at rest with their influences on the vertices: the joints of all skins, or the animated nodes
-    /// and VRM bones of a file without skins. Vertices of rigid parts have one influence, the joint on which they hang.
+    /// Returns the joints at rest with their influences on the vertices: the joints of all skins and the bones of a VRM;
+    /// without skins, the animated nodes, too. Vertices of rigid parts have one influence, the joint on which they hang.
     /// `None` if there are no joints. Positions as [`Self::positions`].
     ///
     /// # Errors

@@ -4,7 +4,10 @@
 //! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
 
 pub mod blend;
+pub mod drive;
+pub mod humanoid;
 pub mod parts;
+pub mod proportions;
 pub mod pull;
 pub mod symmetry;
 

@@ -97,7 +97,12 @@ impl RigArrays {
         let joints = self.names.into_iter().zip(self.parents).zip(at);
         Rig {
             joints: joints
-                .map(|((name, parent), at)| Joint { name, parent: u32::try_from(parent).ok(), at })
+                .map(|((name, parent), at)| Joint {
+                    name,
+                    parent: u32::try_from(parent).ok(),
+                    at,
+                    bone: None,
+                })
                 .collect(),
             first: self.first.to_vec(),
             influences: self.joints.to_vec().into_iter().zip(self.weights.to_vec()).collect(),

@@ -22,7 +22,7 @@ pub(crate) struct Figure {
 
 impl Figure {
     fn joint(&mut self, name: &str, parent: Option<u32>, at: [f32; 3]) -> u32 {
-        self.rig.joints.push(Joint { name: name.to_owned(), parent, at: at.into() });
+        self.rig.joints.push(Joint { name: name.to_owned(), parent, at: at.into(), bone: None });
         self.rig.joints.len() as u32 - 1
     }
 
@@ -292,8 +292,12 @@ fn invalid_rigs_are_refused() {
     }
     // One joint per vertex, more than the limit.
     let points = vec![Vec3::ONE; 1100];
-    let joints =
-        (0..1100).map(|k| Joint { name: String::new(), parent: (k > 0).then(|| k - 1), at: Vec3::ZERO });
+    let joints = (0..1100).map(|k| Joint {
+        name: String::new(),
+        parent: (k > 0).then(|| k - 1),
+        at: Vec3::ZERO,
+        bone: None,
+    });
     let rig = Rig {
         joints: joints.collect(),
         first: (0..=1100).collect(),

@@ -15,11 +15,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::scene::{Node, UnitQuaternion};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::clip::{Clip, clips, quaternion, vector};
 use super::edit::Edit;
-use super::nodes::holders;
+use super::nodes::{holders, vrm_bones};
 use crate::error::WriteError;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
@@ -142,12 +142,8 @@ impl Pose {
 /// foot, or like a hand if it is near the ground.
 fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg> {
     let json = &document.json;
-    let of_1 = &json["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"];
-    let of_0 = json["extensions"]["VRM"]["humanoid"]["humanBones"].as_array();
-    let bone = |name: &str| {
-        let listed = of_0.into_iter().flatten().find(|bone| bone["bone"] == name).map(|bone| &bone["node"]);
-        of_1[name]["node"].as_u64().or(listed.and_then(Value::as_u64)).map(|node| node as usize)
-    };
+    let bones = vrm_bones(document);
+    let bone = |name: &str| bones.iter().find(|(bone, _)| *bone == name).map(|(_, node)| *node);
     let of_side = |side: &str| {
         let [thigh, shin, foot] = ["UpperLeg", "LowerLeg", "Foot"].map(|part| bone(&format!("{side}{part}")));
         Some([thigh?, shin?, foot?])

@@ -127,12 +127,20 @@ pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
         }
         ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_) => None,
     });
-    let bones = |extension: &str| &json["extensions"][extension]["humanoid"]["humanBones"];
-    let of_vrm0 = bones("VRM").as_array().into_iter().flatten();
-    let of_vrm1 = bones("VRMC_vrm").as_object().into_iter().flat_map(|bones| bones.values());
-    let bones = of_vrm0.chain(of_vrm1).filter_map(|bone| bone["node"].as_u64()).map(|node| node as usize);
+    let bones = vrm_bones(document).into_iter().map(|(_, node)| node);
     let joints = document.root.skins.iter().flat_map(|skin| &skin.joints).map(Index::value);
     joints.chain(animated).chain(bones).filter(|&node| node < document.root.nodes.len()).collect()
+}
+
+/// Humanoid bones of a VRM, by their names in its version of the specification, and their nodes: those of VRM 1, then
+/// those of VRM 0.
+pub(super) fn vrm_bones(document: &GltfDocument) -> Vec<(&str, usize)> {
+    let bones = |extension: &str| &document.json["extensions"][extension]["humanoid"]["humanBones"];
+    let of_vrm1 = bones("VRMC_vrm").as_object().into_iter().flatten();
+    let of_vrm1 = of_vrm1.map(|(name, bone)| (Some(name.as_str()), bone));
+    let of_vrm0 = bones("VRM").as_array().into_iter().flatten().map(|bone| (bone["bone"].as_str(), bone));
+    let node = |bone: &Value| usize::try_from(bone["node"].as_u64()?).ok();
+    of_vrm1.chain(of_vrm0).filter_map(|(name, bone)| Some((name?, node(bone)?))).collect()
 }
 
 /// A node that follows the cage: a joint, an animated node, a VRM bone, a node with an unskinned mesh, or a descendant

@@ -1,14 +1,14 @@
-//! Joints at rest and their influences on the vertices, for cages that follow the skeleton.
+//! Joints at rest and their influences on the vertices, for cages and sliders that follow the skeleton.
 
 use cagework_core::rig::{Joint, Rig};
 use glam::{DVec3, Vec3};
 
-use super::nodes::holders;
+use super::nodes::{holders, vrm_bones};
 use super::play::Player;
 use crate::gltf::scene::{Worlds, name_of};
 use crate::gltf::{GltfDocument, GltfError};
 
-/// Reads the joints of all skins, or the animated nodes and VRM bones of a file without skins. Positions are in the
+/// Reads the joints of all skins and the bones of a VRM; without skins, the animated nodes, too. Positions are in the
 /// file's axes, relative to `origin`. Returns `None` if there are none.
 ///
 /// Vertices of rigid meshes have one influence, the nearest of these joints above their node; without one, they have
@@ -19,8 +19,11 @@ use crate::gltf::{GltfDocument, GltfError};
 pub(crate) fn rest_rig(document: &GltfDocument, origin: DVec3) -> Result<Option<Rig>, GltfError> {
     let skins = document.root.skins.iter();
     let mut all: Vec<usize> = skins.flat_map(|skin| &skin.joints).map(::gltf::json::Index::value).collect();
+    let bones = vrm_bones(document);
     if all.is_empty() {
         all = holders(document);
+    } else {
+        all.extend(bones.iter().map(|(_, node)| *node));
     }
     // Joint of each node that is one.
     let mut joint_of = vec![None; document.root.nodes.len()];
@@ -49,6 +52,7 @@ pub(crate) fn rest_rig(document: &GltfDocument, origin: DVec3) -> Result<Option<
         name: name_of(&document.json, "nodes", node, "node"),
         parent,
         at: at.get(node as usize).copied().unwrap_or(Vec3::ZERO),
+        bone: bones.iter().find(|(_, of)| *of == node as usize).map(|(name, _)| (*name).to_owned()),
     };
     let joints = nodes.iter().zip(parents).map(joint).collect();
     let palette: Vec<Option<u32>> =
