@@ -6,6 +6,7 @@ mod controls;
 mod field;
 mod many;
 mod pose;
+mod proportions;
 mod render;
 mod rig;
 mod size;
@@ -29,6 +30,7 @@ pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use field::MapArgs;
 pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
+pub(crate) use proportions::ProportionsArgs;
 pub(crate) use render::{RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
 pub(crate) use size::SizeArgs;
@@ -62,6 +64,8 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and deform the mesh with it.
     Deform(DeformArgs),
+    /// Change the proportions of a humanoid: longer legs, a bigger head.
+    Proportions(ProportionsArgs),
     /// Map points through the deformation of a moved cage, or back.
     Map(MapArgs),
     /// Deform many models with one cage and one pose. The cage is solved once; each model gets its own output file.

@@ -79,7 +79,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         binding.report.notices.extend(model.lost_in(output.format));
         binding.report.notices.extend(model.copies_in(output.format, &bytes));
     }
-    save_cage(args, cage, &model)?;
+    save_cage(args.save_cage.as_deref(), cage, &model)?;
     let report = json(&binding.report);
     if let Some(path) = report_file {
         write(path, report.as_bytes())?;
@@ -100,8 +100,12 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
     Ok(bind(&model.positions, cage, options, &bar)?)
 }
 
-fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError> {
-    let Some(path) = &args.save_cage else { return Ok(()) };
+/// Writes a cage in the axes of the model's file, if a path is given.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(crate) fn save_cage(path: Option<&Path>, cage: &Cage, model: &Model) -> Result<(), CliError> {
+    let Some(path) = path else { return Ok(()) };
     let mesh = model.up().mesh_turned_back(&cage.to_polygon_mesh());
     let made = Model::of_mesh("cage.obj", &mesh, model.origin())?;
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)

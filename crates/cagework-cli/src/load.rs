@@ -31,6 +31,8 @@ pub(crate) struct LoadedCage {
     memory: MemoryArgs,
     /// Controls of the bind; `None` if the cage is not subdivided and has no inner controls.
     set: Option<ControlSet>,
+    /// Loops of vertices around limbs; empty for cages without rings.
+    rings: Vec<Vec<u32>>,
 }
 
 /// Reads a model with faces. `up`: up axis of the file.
@@ -126,6 +128,7 @@ pub(crate) fn load_cage(
     memory: MemoryArgs,
     controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
+    let mut rings = Vec::new();
     let model = match source {
         CageSource::File(path) => {
             return load_cage_file(path, around.up(), Some(around.origin()), memory, controls);
@@ -140,10 +143,11 @@ pub(crate) fn load_cage(
             // As in [`Model::states`], a rig that cannot be read is ignored.
             let rig = around.rest_rig().unwrap_or_default();
             let made = generate_for(&positions, &triangles, rig.as_ref(), &options)?;
+            rings = made.rings.iter().flat_map(|rings| rings.loops().into_values()).collect();
             Model::of_mesh("generated cage", &made.cage.to_polygon_mesh(), around.origin())?
         }
     };
-    LoadedCage::new(model, around.up(), memory, controls)
+    Ok(LoadedCage { rings, ..LoadedCage::new(model, around.up(), memory, controls)? })
 }
 
 /// Reads a cage file. `up`: up axis of the file. `origin` is subtracted from its positions; by default, a point near
@@ -207,12 +211,17 @@ impl LoadedCage {
             .and_then(|mesh| Cage::new(&mesh))
             .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
         let set = load_controls(&cage, controls, (up, model.origin()), memory)?;
-        Ok(Self { cage, model, up, memory, set })
+        Ok(Self { cage, model, up, memory, set, rings: Vec::new() })
     }
 
     /// Point that was subtracted from all positions of the cage, in the axes of its file.
     pub(crate) fn origin(&self) -> DVec3 {
         self.model.origin()
+    }
+
+    /// Loops of vertices around limbs; empty for cages without rings, and for those of files.
+    pub(crate) fn rings(&self) -> &[Vec<u32>] {
+        &self.rings
     }
 
     /// Controls to bind to: the cage's vertices and the inner controls.

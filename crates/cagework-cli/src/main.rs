@@ -24,6 +24,7 @@ mod info;
 mod load;
 mod pose;
 mod progress;
+mod proportions;
 mod pull;
 mod refit;
 mod render;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Proportions(args) => proportions::run(args, cli.json),
         Command::Map(args) => field::run(args, cli.json),
         Command::Refit(args) => refit::run(args, cli.json),
         Command::Transfer(args) => transfer::run(args, cli.json),

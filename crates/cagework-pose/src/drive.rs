@@ -6,6 +6,7 @@
 use cagework_core::rig::Rig;
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::ends::ENDS;
 use crate::humanoid::{Bone, Humanoid, N_BONES};
 
 /// Number of vertices of the model from which a cage vertex takes its weights.
@@ -15,9 +16,9 @@ const SPREAD: f64 = 1.5;
 /// Share of the mean of its ring in the weights of a vertex on a limb.
 const RING_SHARE: f64 = 0.4;
 /// Weights of hands, feet and head above this make a vertex follow that bone more closely.
-const END_FROM: f64 = 0.2;
+const END_FROM: f64 = 0.05;
 /// Weights of hands, feet and head above this make a vertex follow that bone only.
-const END_FULL: f64 = 0.8;
+const END_FULL: f64 = 0.5;
 /// Vertices whose weights for bones are less than this together give no weights.
 const LEAST: f64 = 0.5;
 
@@ -47,8 +48,8 @@ impl BoneWeights {
     /// as those of generated cages; may be empty. `positions`: vertices of the model at the rest of the rig, object
     /// units. Vertices of the cage without a skinned vertex follow the hips.
     ///
-    /// Hands, feet and head keep their shape: where one of them has more than 0.2 of the weight, its weight grows, to 1
-    /// from 0.8 on.
+    /// Hands, feet and head keep their shape: where one of them has more than 0.05 of the weight, its weight grows, to 1
+    /// from 0.5 on.
     #[must_use]
     pub fn of_skin(
         cage: &[Vec3],
@@ -204,15 +205,6 @@ fn normalized(mut row: [f64; N_BONES]) -> [f64; N_BONES] {
     }
     row
 }
-
-/// Bones that keep their shape, with those that move with them.
-const ENDS: [&[Bone]; 5] = [
-    &[Bone::Head],
-    &[Bone::LeftHand],
-    &[Bone::RightHand],
-    &[Bone::LeftFoot, Bone::LeftToes],
-    &[Bone::RightFoot, Bone::RightToes],
-];
 
 /// Row with larger weights of the bones that keep their shape.
 fn with_ends(mut row: [f64; N_BONES]) -> [f64; N_BONES] {

@@ -5,6 +5,7 @@
 
 pub mod blend;
 pub mod drive;
+mod ends;
 pub mod humanoid;
 pub mod parts;
 pub mod proportions;

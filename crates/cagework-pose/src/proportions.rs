@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::drive::{BoneWeights, Map, Trunk, skin_of_bones};
+use crate::ends::EndFit;
 use crate::humanoid::{Bone, Humanoid, N_BONES};
 
 /// Range of all factors.
@@ -322,6 +323,7 @@ pub struct HumanoidCage {
     frame: Frame,
     /// Height of the chin above the middle of the hip joints.
     chin: f64,
+    ends: Option<EndFit>,
 }
 
 /// Axes of a figure, and heights above the middle of its hip joints.
@@ -394,7 +396,18 @@ impl HumanoidCage {
         let weights = BoneWeights::of_skin(rest, rings, positions, rig, humanoid);
         // Long hair hangs below the chin.
         let chin = chin.clamp(frame.neck, frame.head);
-        Self { rest: rest.to_vec(), weights, joints, frame, chin }
+        Self { rest: rest.to_vec(), weights, joints, frame, chin, ends: None }
+    }
+
+    /// Lets poses keep the shape of hands, feet and head better, by the bind of the model: the pose is corrected by
+    /// least squares, so that their vertices come closest to their images.
+    ///
+    /// `weights`: one row per vertex of the model first, one column per control first. The other arguments as for
+    /// [`Self::new`].
+    #[must_use]
+    pub fn with_bind(self, weights: &Weights, positions: &[Vec3], rig: &Rig, humanoid: &Humanoid) -> Self {
+        let ends = EndFit::new(self.rest.len(), weights, positions, rig, humanoid);
+        Self { ends, ..self }
     }
 
     /// Weights of the bones at the vertices of the cage.
@@ -412,7 +425,11 @@ impl HumanoidCage {
             return self.rest.clone();
         }
         let frame = &self.frame;
-        let mut posed = self.weights.drive(&self.rest, &self.maps(proportions));
+        let maps = self.maps(proportions);
+        let mut posed = self.weights.drive(&self.rest, &maps);
+        if let Some(ends) = &self.ends {
+            ends.correct(&self.rest, &mut posed, &maps);
+        }
         let (legs, feet) = (self.shares(|leg| leg), self.shares(|leg| &leg[2..]));
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             for (v, p) in posed.iter_mut().enumerate().filter(|(v, _)| legs[side][*v] > OF_LEG) {

@@ -206,7 +206,14 @@ impl Humanoid {
         };
         let of_vrm = with_given(of_vrm(rig));
         let of_names = with_given(names::find(rig));
-        let of_shape = || shape::find(rig).map(with_given);
+        // The shape must not contradict the names of limbs.
+        let agrees = |of_shape: &Joints| {
+            LIMBS.iter().flatten().all(|&bone| {
+                let [shape, name] = [of_shape, &of_names].map(|joints| joints[bone as usize]);
+                name.is_none() || name == shape
+            })
+        };
+        let of_shape = || shape::find(rig).map(with_given).filter(agrees);
         let (joints, source) = if missing(&of_vrm).is_empty() {
             (of_vrm, BoneSource::Vrm)
         } else if missing(&of_names).is_empty() {

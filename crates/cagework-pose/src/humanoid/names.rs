@@ -37,7 +37,7 @@ const WORDS: [(Part, &[&str]); 14] = [
     (SHOULDER, &["shoulder", "clavicle", "collar", "collarbone", "肩"]),
     (UPPER_ARM, &["upperarm", "uparm", "armupper", "arm", "shldrbend", "shldr", "腕"]),
     (LOWER_ARM, &["lowerarm", "forearm", "loarm", "armlower", "elbow", "forearmbend", "ひじ"]),
-    (HAND, &["hand", "wrist", "palm", "手首"]),
+    (HAND, &["hand", "wrist", "palm", "fist", "手首"]),
     (UPPER_LEG, &["upperleg", "upleg", "thigh", "legupper", "thighbend", "足"]),
     (LOWER_LEG, &["lowerleg", "loleg", "shin", "calf", "knee", "leglower", "ひざ"]),
     (FOOT, &["foot", "ankle", "足首"]),
@@ -172,7 +172,27 @@ pub(super) fn find(rig: &Rig) -> Joints {
         }
     }
     complete_rigify(rig, &names, &mut found);
+    complete_ends(rig, &names, &mut found);
     found
+}
+
+/// A hand or foot without a usual name is the only joint below the forearm or shin.
+fn complete_ends(rig: &Rig, names: &[(usize, Name)], found: &mut Joints) {
+    let ends = [
+        (Bone::LeftLowerArm, Bone::LeftHand),
+        (Bone::RightLowerArm, Bone::RightHand),
+        (Bone::LeftLowerLeg, Bone::LeftFoot),
+        (Bone::RightLowerLeg, Bone::RightFoot),
+    ];
+    for (lower, end) in ends {
+        let (Some(lower), None) = (found[lower as usize], found[end as usize]) else { continue };
+        let is_below =
+            |(joint, name): &&(usize, Name)| rig.joints[*joint].parent == Some(lower) && !name.is_helper();
+        let mut below = names.iter().filter(is_below);
+        if let (Some((joint, _)), None) = (below.next(), below.next()) {
+            found[end as usize] = Some(*joint as u32);
+        }
+    }
 }
 
 /// Rigify calls hips, neck and head "spine": the first spine joint is the hips, the last two are neck and head.
