@@ -3,6 +3,9 @@
 //! Limbs are scaled along and across their bones, the trunk by heights; hands, feet and head keep their shape. The pose
 //! is the cage at rest moved by these maps, weighted by the skin ([`crate::drive`]).
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
 use cagework_core::deform::deform_bound;
