@@ -8,7 +8,7 @@ use cagework_core::deform::outside_in_words;
 use cagework_core::options::BindOptions;
 use cagework_core::words::counted;
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
-use cagework_pose::humanoid::{BoneJoint, BoneSource, Humanoid, HumanoidError};
+use cagework_pose::humanoid::{BoneJoint, BoneSource};
 use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, ProportionRange};
 use glam::Vec3;
 use serde::Serialize;
@@ -62,10 +62,7 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
     check_outputs(&outputs, &inputs)?;
 
     let model = load_model(mesh, args.read.axis(), args.read.memory)?;
-    let of_file = |error: HumanoidError| CliError::file(mesh, error);
-    let rig = model.rest_rig().map_err(|e| CliError::file(mesh, e))?;
-    let rig = rig.ok_or_else(|| of_file(HumanoidError::NoRig))?;
-    let humanoid = Humanoid::of_rig(&rig, &args.bone).map_err(of_file)?;
+    let (rig, humanoid) = model.humanoid(&args.bone).map_err(|e| CliError::file(mesh, e))?;
     let loaded = load_cage(&args.cage, &model, args.read.memory, &ControlArgs::default())?;
     if let Some(output) = &args.pose_out {
         loaded.require_order_in(output)?;

@@ -16,6 +16,9 @@ pub enum WriteError {
         /// Number of vertices of the model.
         expected: usize,
     },
+    /// The rig is not that of a humanoid.
+    #[error(transparent)]
+    Humanoid(#[from] cagework_pose::humanoid::HumanoidError),
     /// A position is not a finite number.
     #[error("the new position of vertex {vertex} is not a finite number")]
     NotFinite {

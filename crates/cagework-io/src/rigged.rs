@@ -3,6 +3,7 @@
 use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, shells_of_points};
 use cagework_core::words::decimals;
+use cagework_pose::humanoid::{Bone, Humanoid};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
@@ -107,6 +108,20 @@ impl Model {
             joint.at = at;
         }
         Ok(Some(rig))
+    }
+
+    /// Returns the joints at rest, and which of them are the bones of a humanoid. `bones`: bones and the names of their
+    /// joints, which take precedence over what is found.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the joints cannot be read, or are not those of a humanoid.
+    pub fn humanoid(
+        &self,
+        bones: &[(Bone, String)],
+    ) -> Result<(cagework_core::rig::Rig, Humanoid), WriteError> {
+        let rig = self.rest_rig()?.unwrap_or_default();
+        let humanoid = Humanoid::of_rig(&rig, bones)?;
+        Ok((rig, humanoid))
     }
 
     /// Names of unskinned parts attached to joints or animated nodes, such as buckles, eyes and weapons. They

@@ -68,6 +68,11 @@ impl Cage {
         Controls::from(&self.set)
     }
 
+    /// Loops of vertices around limbs; none without rings.
+    pub(crate) fn loops(&self) -> Vec<Vec<u32>> {
+        self.rings.iter().flat_map(|rings| rings.loops().into_values()).collect()
+    }
+
     fn mesh(&self) -> PolygonMesh {
         self.set.cage().to_polygon_mesh()
     }

@@ -11,6 +11,7 @@ mod error;
 mod field;
 mod files;
 mod options;
+mod proportions;
 mod pull;
 mod reshape;
 mod splats;
@@ -31,6 +32,8 @@ mod native {
     use crate::field::Field;
     #[pymodule_export]
     use crate::files::read_model;
+    #[pymodule_export]
+    use crate::proportions::{humanoid_bones, proportions};
     #[pymodule_export]
     use crate::pull::pull;
     #[pymodule_export]

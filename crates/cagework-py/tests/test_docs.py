@@ -8,7 +8,7 @@ import cagework as cw
 import numpy as np
 import pytest
 from cagework.distributed import reshape_files
-from support import rigged_glb, splat_records
+from support import humanoid_glb, rigged_glb, splat_records
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -29,6 +29,7 @@ def documented():
 @pytest.mark.parametrize(("name", "text"), list(documented()))
 def test_every_documented_function_has_an_example_that_runs(name, text, model, tmp_path, monkeypatch):
     (tmp_path / "fox.glb").write_bytes(rigged_glb())
+    (tmp_path / "humanoid.glb").write_bytes(humanoid_glb())
     (tmp_path / "plant.splat").write_bytes(splat_records().tobytes())
     monkeypatch.chdir(tmp_path)
     names = {"cw": cw, "np": np, "mesh": model}

@@ -15,6 +15,7 @@ mod field;
 mod fit;
 #[cfg(unix)]
 mod outputs;
+mod proportions;
 mod pull;
 mod refit;
 mod render;

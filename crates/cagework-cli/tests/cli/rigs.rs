@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::support::{Sandbox, glb_json};
 
 /// A folder with the humanoid.
-fn humanoid() -> Sandbox {
+pub(crate) fn humanoid() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
     let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();

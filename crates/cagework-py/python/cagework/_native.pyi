@@ -134,6 +134,17 @@ def pull(
     relax: float = 0.5,
     **options: Unpack[BindOptions],
 ) -> NDArray[np.float64]: ...
+def humanoid_bones(model: _Model, bones: dict[str, str] | None = None) -> dict[str, str]: ...
+def proportions(
+    model: _Model,
+    cage: Cage,
+    factors: dict[str, float] | None = None,
+    *,
+    preset: Literal["longer legs", "big head", "hero", "chibi", "slim", "stout"] | None = None,
+    bones: dict[str, str] | None = None,
+    progress: _Progress = None,
+    **options: Unpack[BindOptions],
+) -> NDArray[np.float64]: ...
 def read_model(
     model: _Model | list[_Model], states: bool = False, clip: str | None = None
 ) -> tuple[NDArray[np.float32] | NDArray[np.float64], NDArray[np.int32]]: ...
