@@ -2,10 +2,8 @@
 // weights between two fields over the columns of a batch, and adds the sum to `changes`. One invocation per row of the
 // fields. CPU: cagework_core::stencil::change_norms.
 
-/// Bits of `mode`. CHANGE_ABSOLUTE: sum absolute values instead of squares. CHANGE_FIRST, for the first batch:
-/// overwrite `changes` instead of adding to them.
-const CHANGE_ABSOLUTE = 1u;
-const CHANGE_FIRST = 2u;
+/// Mode for the first batch: overwrite `changes` instead of adding to them.
+const CHANGE_FIRST = 1u;
 /// Smaller changes of a weight are counted as 0, because their squares would be denormal numbers.
 const MIN_CHANGE = 1e-18f;
 
@@ -20,12 +18,12 @@ fn change_norms(@builtin(global_invocation_id) id: vec3u) {
     if number >= work.count { return; }
     let row = work.first + number;
     var sum = 0.0;
-    if (work.mode & CHANGE_FIRST) == 0u { sum = changes[row]; }
+    if work.mode != CHANGE_FIRST { sum = changes[row]; }
     for (var quad = 0u; quad < work.n_quads; quad++) {
         let i = row * work.n_quads + quad;
         var d = abs(u_new[i] - u_old[i]);
         d = select(vec4f(0.0), d, d > vec4f(MIN_CHANGE));
-        if (work.mode & CHANGE_ABSOLUTE) == 0u { d *= d; }
+        d *= d;
         sum += (d.x + d.y) + (d.z + d.w);
     }
     changes[row] = sum;

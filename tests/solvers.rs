@@ -9,7 +9,7 @@ mod suite;
 
 use std::sync::OnceLock;
 
-use cagework_core::options::{BindOptions, Method, Preconditioner, Solver};
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::{BindError, Binding, Cage, Progress};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_on};
 use glam::Vec3;
@@ -147,13 +147,6 @@ solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jac
 solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
 solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));
 
-/// Creates a back end that solves by conjugate gradients with a V-cycle as preconditioner.
-fn preconditioned_cg(method: Method) -> BackEnd {
-    let mut back_end = cpu(method, Solver::ConjugateGradient, 0);
-    back_end.options.preconditioner = Preconditioner::VCycle;
-    back_end
-}
-
 /// Solvers whose tau bounds the error. Jacobi is not tested here, because its tau bounds the change per sweep.
 mod error_bounds {
     use super::*;
@@ -171,7 +164,6 @@ mod error_bounds {
         // The limit is higher than for multigrid: a V-cycle reduces the error tenfold, so the last V-cycle usually ends
         // further below tau.
         suite::raw::tau_bounds_the_solver_error(&cg, &[32], 1e-5);
-        suite::raw::tau_bounds_the_solver_error(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
     }
 }
 
@@ -202,17 +194,14 @@ mod any_cage {
     }
 }
 
-/// Multigrid on every back end, and conjugate gradients with a V-cycle as preconditioner. The other solvers take
-/// seconds at g = 64; [`agreement`] compares them with multigrid.
+/// Multigrid on every back end. The other solvers take seconds at g = 64; [`agreement`] compares them with multigrid.
 mod accuracy {
     use super::*;
 
     #[test]
     fn armadillo_is_exact_at_64() {
         let [one, all] = [1, 0].map(|threads| cpu(Method::Embedded, Solver::Multigrid, threads));
-        let mut cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
-        cg.options.preconditioner = Preconditioner::VCycle;
-        for back_end in [one, all, cg, gpu(Method::Embedded, Solver::Multigrid)] {
+        for back_end in [one, all, gpu(Method::Embedded, Solver::Multigrid)] {
             suite::reference::armadillo_is_exact_at_64(&back_end);
         }
     }
@@ -242,7 +231,6 @@ mod agreement {
         for method in METHODS {
             let multigrid = cpu(method, Solver::Multigrid, 0);
             suite::agreement::solvers_agree(&cpu(method, Solver::ConjugateGradient, 0), &multigrid);
-            suite::agreement::solvers_agree(&preconditioned_cg(method), &multigrid);
         }
     }
 

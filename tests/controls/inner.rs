@@ -327,7 +327,7 @@ fn back_ends_and_methods_agree_on_inner_controls() {
 
 /// 64 balls that are smaller than the cells of coarse levels. V-cycles alone converge slowly or diverge here, so the
 /// solver switches to conjugate gradients, which run on the processor even if the bind runs on a GPU. The expected
-/// weights are computed by conjugate gradients without a preconditioner.
+/// weights are computed by conjugate gradients alone.
 #[test]
 fn many_small_balls_do_not_stall_the_solve() {
     let places = [-0.787_f32, -0.254, 0.280, 0.813];

@@ -24,7 +24,6 @@ use crate::rig;
 /// # Errors
 /// If a file cannot be read or written, the cage is invalid, or the bind fails or is cancelled.
 pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
-    args.solve.check()?;
     let report_file = args.report.as_deref().filter(|path| *path != Path::new("-"));
     let report_to_stdout = as_json || (args.report.is_some() && report_file.is_none());
     let output = args.output.as_ref().map(|output| output.path.as_path());

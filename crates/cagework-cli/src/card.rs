@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use cagework_core::BindReport;
-use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
+use cagework_core::options::Solver;
 
 use crate::controls::inner_controls_text;
 use crate::files::shown_path;
@@ -23,7 +23,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     };
     let threads = if report.threads == 1 { "1 thread".into() } else { format!("{} threads", report.threads) };
     let place = report.adapter.clone().unwrap_or(threads);
-    row("method", format!("{}, {}, {} ({place})", method(report), solver(report), report.backend));
+    row("method", format!("{}, {}, {} ({place})", report.method, solver(report), report.backend));
     let [x, y, z] = report.dims;
     row("grid", format!("{} ({x} x {y} x {z} cells)", report.grid));
     if let Some(reason) = &report.grid_reason {
@@ -115,20 +115,11 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     out
 }
 
-fn method(report: &BindReport) -> &'static str {
-    match (report.method, report.cell_shape) {
-        (Method::Embedded, _) => "embedded",
-        (Method::Classic, CellShape::Box) => "classic",
-        (Method::Classic, CellShape::Cubic) => "classic with cubic cells",
-    }
-}
-
 fn solver(report: &BindReport) -> &'static str {
-    match (report.solver, report.preconditioner) {
-        (Solver::Jacobi, _) => "Jacobi",
-        (Solver::Multigrid, _) => "multigrid",
-        (Solver::ConjugateGradient, Preconditioner::None) => "conjugate gradients",
-        (Solver::ConjugateGradient, Preconditioner::VCycle) => "conjugate gradients with V-cycles",
+    match report.solver {
+        Solver::Jacobi => "Jacobi",
+        Solver::Multigrid => "multigrid",
+        Solver::ConjugateGradient => "conjugate gradients",
     }
 }
 

@@ -51,7 +51,6 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
     let Some(mesh) = args.mesh.as_deref().filter(|_| !args.presets) else {
         return print(&if as_json { json(&PRESETS) } else { PRESETS.iter().map(preset_text).collect() });
     };
-    args.solve.check()?;
     let outputs = args.output.iter().chain(&args.pose_out).map(|output| output.path.as_path());
     let outputs: Vec<&Path> = outputs.chain(args.save_cage.as_deref()).collect();
     let mut inputs = vec![mesh];

@@ -47,7 +47,6 @@ struct RenderSummary {
 /// # Errors
 /// If a file cannot be read or written, files do not match, no GPU is available, or the bind fails.
 pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
-    args.solve.check()?;
     let mut inputs = vec![args.model.as_path()];
     inputs.extend(args.pose.as_deref());
     inputs.extend(args.weights.as_deref());

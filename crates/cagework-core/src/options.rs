@@ -88,39 +88,6 @@ impl Method {
 }
 
 choice! {
-    /// Preconditioner of conjugate gradients.
-    Preconditioner {
-        /// No preconditioner.
-        #[default]
-        None = "none",
-        /// One multigrid V-cycle.
-        VCycle = "v_cycle",
-    }
-}
-
-choice! {
-    /// Cell shape of the classic method.
-    CellShape {
-        /// Rectangular cells: `grid` of them along each axis of the cage's box, as in K. Smith's paper.
-        #[default]
-        Box = "box",
-        /// Cubic cells: `grid` of them along the longest axis of the cage's box.
-        Cubic = "cubic",
-    }
-}
-
-choice! {
-    /// Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
-    DeltaNorm {
-        /// Euclidean norm of a cell's change: `sqrt(sum_i (w_i^n - w_i^(n-1))^2)`.
-        #[default]
-        Euclidean = "euclidean",
-        /// Eq. 2 as printed: `sqrt(sum_i |w_i^n - w_i^(n-1)|)`.
-        Literal = "literal",
-    }
-}
-
-choice! {
     /// Treatment of mesh vertices outside the cage.
     OutsidePolicy {
         /// Weights are extended linearly up to 5 % of the cage's diagonal from the cage. Farther out, displacements
@@ -305,7 +272,7 @@ impl Number {
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindOptions {
-    /// Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
+    /// Cells along the longest side of the cage's box, 8 to 512; with the classic method, along each side.
     /// [`AUTO_GRID`] (0, or "auto" in JSON that is read) chooses the number for the cage. Default 0.
     #[serde(deserialize_with = "grid_or_auto")]
     pub grid: u32,
@@ -313,20 +280,14 @@ pub struct BindOptions {
     pub method: Method,
     /// Solver of Laplace's equation. Default multigrid.
     pub solver: Solver,
-    /// Preconditioner of conjugate gradients. Default none.
-    pub preconditioner: Preconditioner,
-    /// Cell shape of the classic method. Default box.
-    pub cell_shape: CellShape,
-    /// Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
-    pub delta_norm: DeltaNorm,
     /// Number of threads; 0 uses one per processor. Default 0. The page uses a single thread.
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub threads: usize,
     /// Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
     /// of the other solvers. Default 1e-5.
     pub tau: f32,
-    /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles, and steps with a V-cycle in each,
-    /// also stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
+    /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles also
+    /// stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
     pub max_iterations: u32,
     /// Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
     /// restored. 0 drops none. Default 0.
@@ -353,9 +314,6 @@ impl Default for BindOptions {
             grid: AUTO_GRID,
             method: Method::default(),
             solver: Solver::default(),
-            preconditioner: Preconditioner::default(),
-            cell_shape: CellShape::default(),
-            delta_norm: DeltaNorm::default(),
             threads: 0,
             tau: 1e-5,
             max_iterations: 20_000,
@@ -427,11 +385,7 @@ impl BindOptions {
     /// Whether the solver uses multigrid, which needs coarser levels of the grid.
     #[must_use]
     pub fn needs_coarse_levels(&self) -> bool {
-        match self.solver {
-            Solver::Jacobi => false,
-            Solver::Multigrid => true,
-            Solver::ConjugateGradient => self.preconditioner == Preconditioner::VCycle,
-        }
+        self.solver == Solver::Multigrid
     }
 }
 
@@ -453,9 +407,6 @@ mod tests {
     fn words_are_parsed_displayed_and_serialised_consistently() {
         assert_words::<Method>();
         assert_words::<Solver>();
-        assert_words::<Preconditioner>();
-        assert_words::<CellShape>();
-        assert_words::<DeltaNorm>();
         assert_words::<OutsidePolicy>();
         assert_words::<Backend>();
         assert_eq!(OutsidePolicy::Extend.to_string(), "extend");

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solver};
+use crate::options::{Backend, Method, Solver};
 
 /// Options, grid, convergence, times and errors of a bind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,9 +12,6 @@ pub struct BindReport {
     pub method: Method,
     /// Solver of Laplace's equation: Jacobi, multigrid, or conjugate gradients.
     pub solver: Solver,
-    /// Preconditioner of conjugate gradients.
-    #[serde(default)]
-    pub preconditioner: Preconditioner,
     /// Processor that computed the bind.
     pub backend: Backend,
     /// Name of the GPU, if it computed the solution.
@@ -33,10 +30,6 @@ pub struct BindReport {
     pub dims: [u32; 3],
     /// Edge lengths of a cell, object units.
     pub cell_size: [f32; 3],
-    /// Shape of the cells: rectangular (K. Smith) or cubic.
-    pub cell_shape: CellShape,
-    /// Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2; `docs/method.md`, sources).
-    pub delta_norm: DeltaNorm,
     /// Convergence threshold for delta, the last value of `delta_history`.
     pub tau: f32,
     /// Cells of the finest grid by kind.

@@ -80,9 +80,9 @@ impl Slice {
                 })
             }
             Method::Classic => {
-                let (dims, origin, cell) = place_grid(cage, cells, options.cell_shape);
+                let (dims, origin, cell) = place_grid(cage, cells);
                 let grid = Grid { dims: dims.to_array(), origin, cell };
-                let cells = voxelize_classic(controls, cells, options.cell_shape);
+                let cells = voxelize_classic(controls, cells);
                 Self::of(&grid, axis, fraction, |cell| cells.kinds[grid.index(cell)])
             }
         }

@@ -17,7 +17,6 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::grid::NO_CELL;
-use crate::options::DeltaNorm;
 use crate::solve::rows::{MIN_CHANGE, ProlongationMode};
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
@@ -71,23 +70,16 @@ pub fn jacobi_cells(
     }
 }
 
-/// Adds the squared changes (absolute changes for [`DeltaNorm::Literal`]) of each row, summed over the lanes, to
-/// `changes` (`[row]`), which the `first` batch overwrites. GPU kernel: `shaders/change_norms.wgsl`.
-pub fn change_norms(
-    n_lanes: usize,
-    norm: DeltaNorm,
-    first: bool,
-    u_old: &[f32],
-    u_new: &[f32],
-    changes: &mut [f32],
-) {
+/// Adds the squared changes of each row, summed over the lanes, to `changes` (`[row]`), which the `first` batch
+/// overwrites. GPU kernel: `shaders/change_norms.wgsl`.
+pub fn change_norms(n_lanes: usize, first: bool, u_old: &[f32], u_new: &[f32], changes: &mut [f32]) {
     for (row, change) in changes.iter_mut().enumerate() {
         let mut sum = if first { 0.0 } else { *change };
         for quad in (row * n_lanes..(row + 1) * n_lanes).step_by(4) {
             let term = |k: usize| {
                 let d = (u_new[quad + k] - u_old[quad + k]).abs();
                 let d = if d > MIN_CHANGE { d } else { 0.0 };
-                if norm == DeltaNorm::Literal { d } else { d * d }
+                d * d
             };
             sum += (term(0) + term(1)) + (term(2) + term(3));
         }

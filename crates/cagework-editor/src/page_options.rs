@@ -209,7 +209,7 @@ mod tests {
         let settings = read(&json!({ "bind": { "grid": 32 }, "cage": { "target": 120 } }));
         assert_eq!(settings.rig, None);
         let bind = settings.bind.unwrap();
-        assert_eq!((&bind["grid"], &bind["preconditioner"]), (&json!(32), &json!("none")));
+        assert_eq!((&bind["grid"], &bind["solver"]), (&json!(32), &json!("multigrid")));
         let cage = settings.cage.unwrap();
         assert_eq!((&cage["target"], &cage["voxels"]), (&json!(120), &json!(0)));
         assert_eq!(read(&json!({})), Settings::default());

@@ -163,7 +163,7 @@ async fn jacobi(
     let jacobi = Jacobi::new(stream, &mut allocator, prepared.hierarchy(), plan)?;
     let allocated = allocator.settle().await?;
     let (sweeps, report) = jacobi
-        .solve(stream, rule, options.delta_norm, |stream, sweeps, delta| {
+        .solve(stream, rule, |stream, sweeps, delta| {
             stream.set_status(rule.jacobi_progress(delta), sweeps, Some(delta as f32));
         })
         .await?;

@@ -5,7 +5,6 @@
 //! sweeps. Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, and every
 //! batch adds its changes to one shared buffer with a value per cell.
 
-use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::jacobi::STALLED_SWEEPS;
 use cagework_core::solve::stop::{SolveReport, StopRule};
@@ -96,11 +95,9 @@ impl Jacobi {
         &self,
         stream: &mut Stream<'_>,
         rule: StopRule,
-        norm: DeltaNorm,
         mut checked: impl FnMut(&mut Stream<'_>, u32, f64),
     ) -> Result<(u32, SolveReport), GpuError> {
         let mut report = SolveReport::default();
-        let absolute = if norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
         let work = Work { n_quads: self.n_quads, ..Work::default() };
         let (mut done, mut is_last) = (0, false);
         while !is_last {
@@ -110,9 +107,9 @@ impl Jacobi {
                     let launch = &batch.sweeps[sweep as usize % 2];
                     stream.run(launch, work, self.level.n_rows * self.n_quads).await?;
                 }
-                let first = if number == 0 { mode::CHANGE_FIRST } else { 0 };
+                let mode = if number == 0 { mode::CHANGE_FIRST } else { 0 };
                 let launch = &batch.changes[(done + round - 1) as usize % 2];
-                stream.run(launch, Work { mode: absolute | first, ..work }, self.level.n_rows).await?;
+                stream.run(launch, Work { mode, ..work }, self.level.n_rows).await?;
             }
             done += round;
             sum_into(stream, &self.roots, &self.sum, self.level.n_rows, 0).await?;

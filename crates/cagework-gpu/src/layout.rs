@@ -31,10 +31,8 @@ pub struct Work {
 
 /// Values of [`Work::mode`]. The shaders define constants with the same names.
 pub mod mode {
-    /// Mode of `change_norms`: add absolute values instead of squares.
-    pub const CHANGE_ABSOLUTE: u32 = 1;
     /// Mode of `change_norms`: overwrite sums instead of adding to them.
-    pub const CHANGE_FIRST: u32 = 2;
+    pub const CHANGE_FIRST: u32 = 1;
     /// Mode of `prolong_correction`: overwrite values by the mean of their coarse neighbours.
     pub const PROLONG_REPLACE: u32 = 1;
     /// Mode of `deform_splats`: also compute rotations.

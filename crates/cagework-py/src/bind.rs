@@ -38,8 +38,7 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// Options, as for `cagework bind`: grid="auto" (cells along the longest side: 64, 96, 128 or 192, so that the narrowest part
 /// and gap of the cage are four cells wide if possible, or up to 320 if fewer do not resolve the cage; or a number from 8
 /// to 512), method="embedded" or "classic",
-/// solver="multigrid", "jacobi" or "cg", preconditioner="none" or "v_cycle", cell_shape="box" or "cubic",
-/// delta_norm="euclidean" or "literal", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
+/// solver="multigrid", "jacobi" or "cg", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
 /// (bytes), outside="extend", "stay" or "refuse".
 ///
 /// progress: function that is called with the completed fraction, 0 to 1, every 50 ms; raise in it to cancel.

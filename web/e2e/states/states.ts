@@ -114,7 +114,7 @@ const reportBy = (way: Partial<BindOptions>): BindReport =>
     outside_vertices: 2,
   });
 const REPORT = reportBy({});
-const EARLIER_REPORTS = [...solvers(32), { solver: "cg", preconditioner: "v_cycle" } as const].map(reportBy);
+const EARLIER_REPORTS = solvers(32).map(reportBy);
 const BOUND_STATE: Patch = {
   model: RIG,
   cage: CAGE,
@@ -153,7 +153,7 @@ const full = (): Record<AppState["step"], Patch> => ({
   bind: {
     earlier: EARLIER_REPORTS,
     appliedOptions: { ...INITIAL_STATE.bindOptions, grid: 32 },
-    bindOptions: { ...RUN, method: "classic", preconditioner: "v_cycle" },
+    bindOptions: { ...RUN, method: "classic" },
     lack: "NoAdapter",
   },
   pose: {
@@ -229,7 +229,6 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { bindOptions: { ...INITIAL_STATE.bindOptions, method: "classic" } },
     { bindOptions: { ...INITIAL_STATE.bindOptions, solver: "jacobi" } },
     { bindOptions: RUN, lack: "NoAdapter" },
-    { bindOptions: { ...RUN, preconditioner: "v_cycle" } },
     { report: { ...REPORT, converged: false } },
     { report: { ...REPORT, at_round_off: true, outside_vertices: 0, backend: "gpu" } },
     { report: { ...REPORT, rest_error: { ...REPORT.rest_error, max_rel: 1 } } },

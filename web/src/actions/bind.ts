@@ -138,11 +138,11 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
 }
 
 /**
- * Whether two binds had the same method, solver, preconditioner, grid and backend. The report of the newer bind then
+ * Whether two binds had the same method, solver, grid and backend. The report of the newer bind then
  * replaces the report of the older bind.
  */
 export function sameWay(a: BindReport, b: BindReport): boolean {
-  const keys = ["method", "solver", "preconditioner", "grid", "backend"] as const;
+  const keys = ["method", "solver", "grid", "backend"] as const;
   return keys.every((key) => a[key] === b[key]);
 }
 

@@ -7,7 +7,7 @@ import { scientific } from "../format";
 import { Button, Facts, Segments } from "../ui/controls";
 import { curvesOf } from "../ui/curves";
 import { Plot } from "../ui/plot";
-import { CompareTable, solverName } from "../ui/report";
+import { CompareTable } from "../ui/report";
 import { Comparison, SlicePosition } from "../ui/see";
 import { T, TOUR } from "../words";
 import type { Guide } from "./guide";
@@ -82,7 +82,8 @@ function Delta({ app, guide, reports }: Figure) {
   const { bindOptions } = app.store.get();
   const [report = null, ...earlier] = [...reports].reverse();
   const curves = curvesOf({ bindRun: null, report, earlier });
-  const iterations = (name: string) => reports.find((one) => solverName(one) === name)?.iterations ?? 0;
+  const iterations = (name: string) =>
+    reports.find((one) => T.report.solvers[one.solver] === name)?.iterations ?? 0;
   return (
     <>
       <Segments<number>

@@ -7,19 +7,7 @@ import { cageBroken, hasUnappliedOptions } from "../derived";
 import { inUnit, percent } from "../format";
 import type { BindRun } from "../state";
 import { T } from "../words";
-import {
-  Button,
-  Fold,
-  fieldsOf,
-  Head,
-  NumberField,
-  Say,
-  Section,
-  Segments,
-  Slider,
-  switchOf,
-  Toggle,
-} from "./controls";
+import { Button, Fold, fieldsOf, Head, NumberField, Say, Section, Segments, Slider } from "./controls";
 import { curvesOf } from "./curves";
 import { Icon } from "./icons";
 import { Plot } from "./plot";
@@ -120,7 +108,7 @@ function Ways({ app }: { app: App }) {
         <Button label={T.bind.published} onClick={() => preset(PAPER_DEFAULTS)} tip={T.bind.publishedTip} />
       </div>
       <Segments
-        label={options.method === "classic" && options.cell_shape === "box" ? T.bind.gridEach : T.bind.grid}
+        label={options.method === "classic" ? T.bind.gridEach : T.bind.grid}
         values={GRIDS}
         labels={(cells) => (cells === 0 ? T.bind.auto : String(cells))}
         {...option("grid")}
@@ -137,13 +125,6 @@ function Ways({ app }: { app: App }) {
         tips={{ cg: T.bind.cgTip }}
         {...option("solver")}
       />
-      {options.solver === "cg" && (
-        <Toggle
-          label={T.bind.preconditioned}
-          sentence={T.bind.preconditionedSentence}
-          {...switchOf(option("preconditioner"), "v_cycle", "none")}
-        />
-      )}
       <p class="hint">{sayOptions(options)}</p>
     </>
   );
@@ -207,12 +188,6 @@ function Advanced({ app }: { app: App }) {
         value={options.sparsify === 0 ? 0 : options.sparsify < 1e-4 ? 0.00001 : 0.001}
         onChange={option("sparsify").onChange}
       />
-      {options.method === "classic" && (
-        <div class="stack">
-          <Segments label={T.bind.cells} labels={T.bind.cellShapes} {...option("cell_shape")} />
-          <Segments label={T.bind.norm} labels={T.bind.norms} {...option("delta_norm")} />
-        </div>
-      )}
       <Segments
         label={T.bind.outside}
         labels={T.bind.outsides}
@@ -224,9 +199,9 @@ function Advanced({ app }: { app: App }) {
 }
 
 /** One sentence about the chosen method and solver. */
-export function sayOptions({ method, solver, preconditioner }: BindOptions): string {
+export function sayOptions({ method, solver }: BindOptions): string {
   const say = T.bind.options;
-  if (solver === "cg") return preconditioner === "v_cycle" ? say.cgPreconditioned : say.cg;
+  if (solver === "cg") return say.cg;
   if (method === "embedded") return solver === "multigrid" ? say.ours : say.oursJacobi;
   return solver === "jacobi" ? say.published : say.publishedMultigrid;
 }

@@ -4,7 +4,6 @@ import type { BindReport } from "../contract";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { type Curve, historyPoints, KINDS } from "./plot";
-import { solverName } from "./report";
 
 /**
  * During a bind, returns only its curve. Otherwise returns the curve of the last bind, then the latest curve of each
@@ -13,7 +12,10 @@ import { solverName } from "./report";
 export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];
   const now = bindRun
-    ? { name: bindRun.pass === "coarse" ? T.bind.coarse : solverName(bindRun.options), points: bindRun.curve }
+    ? {
+        name: bindRun.pass === "coarse" ? T.bind.coarse : T.report.solvers[bindRun.options.solver],
+        points: bindRun.curve,
+      }
     : reports.slice(0, 1).map(pointsOf)[0];
   if (!now) return [];
   if (bindRun) return [{ ...now, kind: "now" }];
@@ -26,5 +28,8 @@ export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
 export type CurveState = Pick<AppState, "bindRun" | "report" | "earlier">;
 
 function pointsOf(report: BindReport) {
-  return { name: solverName(report), points: historyPoints(report.delta_history, report.delta_interval) };
+  return {
+    name: T.report.solvers[report.solver],
+    points: historyPoints(report.delta_history, report.delta_interval),
+  };
 }

@@ -36,7 +36,7 @@ export function ReportCard({ report }: { report: BindReport }) {
       <p class="hint">{verdict(report)}</p>
       <Facts
         rows={[
-          [T.report.method, `${T.report.methods[report.method]}, ${solverName(report)}`],
+          [T.report.method, `${T.report.methods[report.method]}, ${T.report.solvers[report.solver]}`],
           [T.report.grid, T.report.cells(report.dims.join(" × "), report.grid_reason)],
           [T.report.computedOn, report.backend === "gpu" ? T.report.gpu(report.adapter) : T.report.cpu],
           [T.report.restMean, scientific(report.rest_error.mean_rel)],
@@ -86,15 +86,10 @@ function rawFacts(name: string, error: MeanMax | undefined): [string, string][] 
       ];
 }
 
-export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): string {
-  const isPreconditioned = by.solver === "cg" && by.preconditioner === "v_cycle";
-  return `${T.report.solvers[by.solver]}${isPreconditioned ? T.report.vCycles : ""}`;
-}
-
 /** Short name of a bind: method, solver, grid and backend. */
 function wayOf(report: BindReport): string {
   const { method, grid, backend } = report;
-  return `${T.report.short[method]}, ${solverName(report)}, ${grid}, ${T.report.backends[backend]}`;
+  return `${T.report.short[method]}, ${T.report.solvers[report.solver]}, ${grid}, ${T.report.backends[backend]}`;
 }
 
 /** Fraction of the weight matrix that is stored. */

@@ -1,12 +1,9 @@
 //! Arguments for the solver and the memory limit.
 
-use cagework_core::options::{
-    self, Backend, BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
-};
+use cagework_core::options::{self, Backend, BindOptions, Method, OutsidePolicy, Solver};
 use clap::Args;
 
 use super::{number, words};
-use crate::error::CliError;
 
 /// Argument for the memory limit.
 #[derive(Args, Clone, Copy, Debug)]
@@ -38,9 +35,6 @@ pub(crate) struct SolveArgs {
     /// Solver of Laplace's equation [default: multigrid; jacobi with --method classic].
     #[arg(long, value_parser = words::<Solver>())]
     solver: Option<Solver>,
-    /// Preconditioner of conjugate gradients (--solver cg).
-    #[arg(long, default_value_t, value_parser = words::<Preconditioner>())]
-    preconditioner: Preconditioner,
     /// Number of threads; 0 uses one per processor.
     #[arg(long, default_value_t = 0, value_name = "N")]
     threads: usize,
@@ -50,13 +44,6 @@ pub(crate) struct SolveArgs {
     max_iterations: u32,
     #[arg(long, help = options::SPARSIFY.about(), default_value_t = BindOptions::default().sparsify, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
     sparsify: f32,
-    /// Cells of the classic method: fractions of the cage's box along each axis (as published), or cubic.
-    #[arg(long, default_value_t, value_parser = words::<CellShape>())]
-    cells: CellShape,
-    /// Norm of a cell's change in equation 2 of K. Smith's paper, by which Jacobi sweeps stop: Euclidean, or the formula as
-    /// printed.
-    #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
-    delta: DeltaNorm,
     /// Vertices outside the cage: `extend` lets them follow the cage fully up to a distance of 5 % of its diagonal, fading to zero at
     /// 15 %, so that a cage may enclose only an arm; `stay` keeps them in place; `refuse` fails with an error.
     #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
@@ -72,43 +59,12 @@ impl SolveArgs {
         self.backend == Backend::Gpu
     }
 
-    /// Rejects options that the method or solver does not use.
-    ///
-    /// # Errors
-    /// If one of these options is given and is not the default.
-    pub(crate) fn check(&self) -> Result<(), CliError> {
-        let solver = self.solver.unwrap_or(self.method.usual_solver());
-        let refused = |message: &str, hint| Err(CliError::Mismatch { message: message.into(), hint });
-        if self.preconditioner != Preconditioner::default() && solver != Solver::ConjugateGradient {
-            return refused(
-                "--preconditioner: only conjugate gradients have a preconditioner",
-                "add --solver cg, or leave out --preconditioner",
-            );
-        }
-        if self.cells != CellShape::default() && self.method != Method::Classic {
-            return refused(
-                "--cells: the embedded method always uses cubic cells",
-                "leave out --cells, or add --method classic",
-            );
-        }
-        if self.delta != DeltaNorm::default() && solver != Solver::Jacobi {
-            return refused(
-                "--delta: only Jacobi sweeps stop by equation 2",
-                "add --solver jacobi, or leave out --delta",
-            );
-        }
-        Ok(())
-    }
-
     /// Returns bind options with `grid` cells along the cage's longest side and this memory limit.
     pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
         BindOptions {
             grid,
             method: self.method,
             solver: self.solver.unwrap_or(self.method.usual_solver()),
-            preconditioner: self.preconditioner,
-            cell_shape: self.cells,
-            delta_norm: self.delta,
             threads: self.threads,
             tau: self.tau,
             max_iterations: self.max_iterations,

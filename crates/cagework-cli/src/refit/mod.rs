@@ -77,7 +77,6 @@ const PARALLEL_MEMORY_DIVISOR: u64 = 16;
 /// # Errors
 /// If the cage or pose is invalid, two models have the same output, a model failed, or the work was cancelled.
 pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
-    args.solve.check()?;
     if args.solve.on_gpu() {
         return Err(CliError::Mismatch {
             message: "refit solves on the processor only".into(),

@@ -40,25 +40,9 @@ fn options_without_effect_are_refused() {
             ["--around-clip: rings", "hint: leave out"],
         ),
         ("cage mesh.obj --divisions 3 --clearance 0.1 -o c.obj", ["--clearance: a box cage", "hint: "]),
-        (
-            "bind mesh.obj --cage cage.obj --preconditioner v-cycle",
-            ["--preconditioner: only conjugate gradients", "hint: add --solver cg"],
-        ),
-        (
-            "bind mesh.obj --cage cage.obj --cells cubic",
-            ["--cells: the embedded method", "hint: leave out --cells"],
-        ),
-        (
-            "bind mesh.obj --cage cage.obj --method classic --solver cg --delta literal",
-            ["--delta: only Jacobi sweeps", "hint: add --solver jacobi"],
-        ),
     ] {
         assert_refused(&sandbox, args, &words);
     }
-    sandbox.run("bind mesh.obj --cage cage.obj -g 8 --solver cg --preconditioner v-cycle").success();
-    sandbox
-        .run("bind mesh.obj --cage cage.obj -g 8 --method classic --cells cubic --delta literal")
-        .success();
 }
 
 #[test]

@@ -113,8 +113,7 @@ pub(super) fn estimate(
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
         Solver::Multigrid => on_levels(1.5 * n_unknowns + n_cut),
-        // Five fields; the preconditioning V-cycle has another two and a half.
-        Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
+        // Five fields.
         Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),
         Solver::Jacobi => {
             jacobi::field_bytes(n_unknowns as u64, n_cut as u64, n_columns as u64, threads as u64) as f64

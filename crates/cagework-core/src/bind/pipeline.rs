@@ -251,7 +251,6 @@ impl<'a> PreparedBind<'a> {
         let report = BindReport {
             method: options.method,
             solver: options.solver,
-            preconditioner: options.preconditioner,
             backend: if solved.adapter.is_some() { Backend::Gpu } else { Backend::Cpu },
             adapter: solved.adapter,
             threads: team.n_threads(),
@@ -259,8 +258,6 @@ impl<'a> PreparedBind<'a> {
             grid_reason: fineness.choice.reason,
             dims: level.grid.dims,
             cell_size: level.grid.cell.as_vec3().to_array(),
-            cell_shape: options.cell_shape,
-            delta_norm: options.delta_norm,
             tau: options.tau,
             cells: voxels.counts,
             levels: voxels.hierarchy.levels.iter().map(|l| l.n_unknowns() as u64).collect(),

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::options::{BindOptions, Preconditioner, Solver};
+use crate::options::{BindOptions, Solver};
 use crate::progress::{Cancellation, Stage};
 use crate::sample::Stencils;
 use crate::solve::BatchSolver;
@@ -134,11 +134,7 @@ fn solve_batches<T: Send>(
 /// `threads`: number of threads that have a solver.
 fn batch_solver(hierarchy: &Hierarchy, options: &BindOptions, threads: usize) -> Box<dyn BatchSolver> {
     match options.solver {
-        Solver::ConjugateGradient => {
-            let v_cycle = options.preconditioner == Preconditioner::VCycle;
-            let preconditioner = v_cycle.then(|| Box::new(Workspace::new(hierarchy)) as _);
-            Box::new(ConjugateGradient::new(hierarchy, preconditioner))
-        }
+        Solver::ConjugateGradient => Box::new(ConjugateGradient::new(hierarchy)),
         Solver::Multigrid | Solver::Jacobi => {
             let workspace = Workspace::new(hierarchy);
             let with_fallback = workspace.bytes() + ConjugateGradient::bytes_of(hierarchy);
@@ -181,7 +177,7 @@ fn jacobi_fields(
     watch: &Watch<'_>,
 ) -> Result<(Vec<Vec<Row>>, Solution), Cancellation> {
     let rule = options.stop_rule();
-    let (fields, report) = jacobi::solve(hierarchy, team, rule, options.delta_norm, |sweeps, delta| {
+    let (fields, report) = jacobi::solve(hierarchy, team, rule, |sweeps, delta| {
         watch.report(Stage::Solve, rule.jacobi_progress(delta), sweeps, Some(delta as f32)).is_ok()
     })?;
     let level = &hierarchy.levels[0];

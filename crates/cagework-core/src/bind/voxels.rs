@@ -90,7 +90,7 @@ impl Voxelization {
         match options.method {
             Method::Embedded => Grid::cubic(cage.bounds(), options.grid),
             Method::Classic => {
-                let (dims, origin, cell) = place_grid(cage, options.grid, options.cell_shape);
+                let (dims, origin, cell) = place_grid(cage, options.grid);
                 Grid { dims: dims.to_array(), origin, cell }
             }
         }
@@ -104,7 +104,7 @@ impl Voxelization {
     }
 
     fn classic(controls: Controls<'_>, options: &BindOptions) -> Self {
-        let cells = voxelize_classic(controls, options.grid, options.cell_shape);
+        let cells = voxelize_classic(controls, options.grid);
         let boundary = PublishedCells::finest(&cells);
         let count = |kind| cells.kinds.iter().filter(|&&k| k == kind).count() as u64;
         let counts = CellCounts {

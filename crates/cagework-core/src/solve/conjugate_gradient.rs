@@ -1,4 +1,5 @@
-//! Conjugate gradients on a batch of columns, optionally preconditioned by a V-cycle.
+//! Conjugate gradients on a batch of columns. Those that continue a stalled multigrid solve are preconditioned by its
+//! V-cycle.
 //!
 //! Each lane is a separate system with its own step lengths; delta is common to all lanes. Directions are updated by
 //! the Polak-Ribiere formula, which allows an unsymmetric preconditioner such as a V(2,1) cycle.
@@ -12,11 +13,11 @@
 //!
 //! Sources: Hestenes and Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
 
+use super::BatchSolver;
 use super::hierarchy::Hierarchy;
 use super::operator;
 use super::rows::{LANES, Rhs, Row, ZERO};
 use super::stop::{SolveReport, StopRule};
-use super::{BatchSolver, Preconditioner};
 use crate::simd::dispatch;
 
 /// Largest number of steps in each of the two windows from which the convergence rate is measured. Changes of the
@@ -36,6 +37,9 @@ const ROWS_PER_SUM: usize = 1024;
 /// One number per lane.
 type Lanes = [f64; LANES];
 
+/// Preconditioner: writes an approximate solution of `A z = r` to `z`, the second argument. Both are `[n_rows]`.
+pub(super) type Cycle<'a> = &'a mut dyn FnMut(&mut Vec<Row>, &mut Vec<Row>);
+
 /// Fields of a batch on the finest level, `[n_rows]` each.
 #[derive(Debug)]
 pub struct ConjugateGradient {
@@ -47,13 +51,12 @@ pub struct ConjugateGradient {
     /// Product of the operator and the direction.
     image: Vec<Row>,
     cut_rhs: Vec<Row>,
-    preconditioner: Option<Box<dyn Preconditioner>>,
 }
 
 impl ConjugateGradient {
     /// Allocates fields of the finest level.
     #[must_use]
-    pub fn new(hierarchy: &Hierarchy, preconditioner: Option<Box<dyn Preconditioner>>) -> Self {
+    pub fn new(hierarchy: &Hierarchy) -> Self {
         let field = || vec![ZERO; hierarchy.levels[0].n_rows()];
         Self {
             u: field(),
@@ -62,11 +65,10 @@ impl ConjugateGradient {
             direction: field(),
             image: field(),
             cut_rhs: Vec::new(),
-            preconditioner,
         }
     }
 
-    /// Size of the fields of conjugate gradients without a preconditioner, bytes.
+    /// Size of the fields, bytes.
     #[must_use]
     pub fn bytes_of(hierarchy: &Hierarchy) -> usize {
         5 * hierarchy.levels[0].n_rows() * size_of::<Row>()
@@ -77,7 +79,7 @@ impl ConjugateGradient {
     pub(super) fn resume(
         &mut self,
         hierarchy: &Hierarchy,
-        cycle: &mut dyn Preconditioner,
+        cycle: Cycle<'_>,
         (u, rhs): (&mut Vec<Row>, &[Row]),
         (rule, report): (StopRule, SolveReport),
         done: &mut dyn FnMut(u32, f64) -> bool,
@@ -90,14 +92,10 @@ impl ConjugateGradient {
     }
 
     /// Applies the preconditioner to the residual. Returns the dot products `r . z` and `r . r` of each lane.
-    fn precondition(
-        &mut self,
-        hierarchy: &Hierarchy,
-        cycle: &mut Option<&mut dyn Preconditioner>,
-    ) -> [Lanes; 2] {
+    fn precondition(&mut self, cycle: &mut Option<Cycle<'_>>) -> [Lanes; 2] {
         match cycle {
             None => self.z.copy_from_slice(&self.residual),
-            Some(cycle) => cycle.precondition(hierarchy, &mut self.residual, &mut self.z),
+            Some(cycle) => cycle(&mut self.residual, &mut self.z),
         }
         let [descent, squares] = [&self.z, &self.residual].map(|other| products(&self.residual, other));
         let climbs: [bool; LANES] = std::array::from_fn(|k| descent[k] <= 0.0 && squares[k] > 0.0);
@@ -116,7 +114,7 @@ impl ConjugateGradient {
     fn iterate(
         &mut self,
         hierarchy: &Hierarchy,
-        mut cycle: Option<&mut dyn Preconditioner>,
+        mut cycle: Option<Cycle<'_>>,
         rule: StopRule,
         mut report: SolveReport,
         done: &mut dyn FnMut(u32, f64) -> bool,
@@ -127,7 +125,7 @@ impl ConjugateGradient {
         // After cycles that diverged, the first step removes the errors that they amplified: exclude its change from
         // the rate.
         let unlike = usize::from(report.stalled);
-        let [mut descent, mut squares] = self.precondition(hierarchy, &mut cycle);
+        let [mut descent, mut squares] = self.precondition(&mut cycle);
         self.direction.copy_from_slice(&self.z);
         loop {
             operator::apply(level, &self.direction, &mut self.image);
@@ -152,7 +150,7 @@ impl ConjugateGradient {
             }
 
             let before = descent;
-            [descent, squares] = self.precondition(hierarchy, &mut cycle);
+            [descent, squares] = self.precondition(&mut cycle);
             let overlap = products(&self.z, &self.image);
             // Dot product z . (r - r_before), in which r - r_before = -step image.
             let conjugate: Lanes = std::array::from_fn(|k| -step[k] * overlap[k]);
@@ -178,17 +176,7 @@ impl BatchSolver for ConjugateGradient {
         for (number, row) in self.cut_rhs.iter().enumerate() {
             self.residual[level.row_of_cut(number)] = *row;
         }
-        let mut cycle = self.preconditioner.take();
-        let rule = if cycle.is_some() { rule.of_cycles() } else { rule };
-        let report = self.iterate(
-            hierarchy,
-            cycle.as_mut().map(|cycle| &mut **cycle as _),
-            rule,
-            SolveReport::default(),
-            done,
-        );
-        self.preconditioner = cycle;
-        report
+        self.iterate(hierarchy, None, rule, SolveReport::default(), done)
     }
 
     fn field(&self) -> &[Row] {
@@ -196,8 +184,7 @@ impl BatchSolver for ConjugateGradient {
     }
 
     fn bytes(&self) -> usize {
-        let rows = 5 * self.u.len() + self.cut_rhs.len();
-        rows * size_of::<Row>() + self.preconditioner.as_ref().map_or(0, |cycle| cycle.bytes())
+        (5 * self.u.len() + self.cut_rhs.len()) * size_of::<Row>()
     }
 }
 
@@ -297,18 +284,24 @@ mod tests {
         let rule = StopRule { tolerance: 1e-6, max_iterations: 500 };
         let mut multigrid = Workspace::new(&hierarchy);
         multigrid.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
-        let mut n_steps = Vec::new();
-        for is_preconditioned in [false, true] {
-            let cycle = is_preconditioned.then(|| Box::new(Workspace::new(&hierarchy)) as _);
-            let mut solver = ConjugateGradient::new(&hierarchy, cycle);
-            let report = solver.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
+        let mut solver = ConjugateGradient::new(&hierarchy);
+        let plain = solver.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
+        let (mut cycles, mut u, mut rhs) =
+            (Workspace::new(&hierarchy), vec![ZERO; solver.u.len()], Vec::new());
+        hierarchy.fill_cut_rhs(0, &mut rhs);
+        let mut cycle = |r: &mut Vec<Row>, z: &mut Vec<Row>| cycles.precondition(&hierarchy, r, z);
+        let so_far = (rule, SolveReport::default());
+        let preconditioned = ConjugateGradient::new(&hierarchy)
+            .resume(&hierarchy, &mut cycle, (&mut u, &rhs), so_far, &mut |_, _| true)
+            .unwrap();
+        for (report, field) in [(&plain, solver.field()), (&preconditioned, &u)] {
             assert!(report.converged);
-            n_steps.push(report.deltas.len());
-            let pairs = solver.field().as_flattened().iter().zip(multigrid.field().as_flattened());
+            let pairs = field.as_flattened().iter().zip(multigrid.field().as_flattened());
             let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             // The worst cell may differ by ten times the tolerance.
-            assert!(apart < 1e-5, "{apart}, preconditioned: {is_preconditioned}");
+            assert!(apart < 1e-5, "{apart}");
         }
+        let n_steps = [&plain, &preconditioned].map(|report| report.deltas.len());
         assert!(n_steps[1] * 2 < n_steps[0], "{n_steps:?}");
     }
 }

@@ -16,10 +16,9 @@
 //! multigrid.
 
 use super::hierarchy::Hierarchy;
-use super::rows::{Changes, LANES, Rhs, Row, ZERO, jacobi_plane};
+use super::rows::{LANES, Rhs, Row, ZERO, jacobi_plane};
 use super::stop::{SolveReport, StopRule};
 use crate::levels::Level;
-use crate::options::DeltaNorm;
 use crate::progress::Cancellation;
 use crate::simd::dispatch;
 use crate::team::Team;
@@ -70,7 +69,6 @@ pub fn solve(
     hierarchy: &Hierarchy,
     team: &Team,
     rule: StopRule,
-    norm: DeltaNorm,
     mut sweep_done: impl FnMut(u32, f64) -> bool,
 ) -> Result<(Vec<Vec<Row>>, SolveReport), Cancellation> {
     let level = &hierarchy.levels[0];
@@ -81,7 +79,7 @@ pub fn solve(
     let (mut round, mut is_done) = (1, false);
     while !is_done {
         round = round.min(rule.max_iterations as usize - report.deltas.len());
-        team.each_mut(&mut shares, |share| share.sweep(level, round, norm));
+        team.each_mut(&mut shares, |share| share.sweep(level, round));
         for delta in &mean_deltas(&shares, level, team)[..round] {
             // A round may run past the sweep at which the rule holds.
             let had_converged = report.converged;
@@ -118,8 +116,7 @@ fn next_round(history: &[f64], tau: f64) -> usize {
     }
 }
 
-/// Delta (Eq. 2) averaged over cells for each sweep of a round, from the changes of all threads. Both norms take the
-/// root of the sums that the kernel accumulated: of squares or of absolute values.
+/// Delta (Eq. 2) averaged over cells for each sweep of a round, from the squared changes of all threads.
 fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MAX_ROUND_SWEEPS] {
     let n_rows = level.n_rows();
     let pieces = team.share(
@@ -142,8 +139,8 @@ fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MA
     sums.map(|sum| sum / level.n_unknowns().max(1) as f64)
 }
 
-/// Sum over a range of cells of the square root of each cell's change in one sweep. The change of a cell is the sum of
-/// its changes over all threads.
+/// Sum over a range of cells of each cell's change in one sweep: the square root of its squared changes, summed over
+/// all threads.
 #[inline(always)]
 fn sum_of_roots(shares: &[ThreadBatches], sweep: usize, cells: std::ops::Range<usize>) -> f64 {
     let mut sums = ZERO;
@@ -178,14 +175,14 @@ impl ThreadBatches {
         Self { batches, changes: vec![vec![0.0; n_rows]; MAX_ROUND_SWEEPS] }
     }
 
-    fn sweep(&mut self, level: &Level, round: usize, norm: DeltaNorm) {
+    fn sweep(&mut self, level: &Level, round: usize) {
         for changes in &mut self.changes[..round] {
             changes.fill(0.0);
         }
         for batch in &mut self.batches {
             for changes in &mut self.changes[..round] {
                 let (old, new, f) = (&batch.old, &mut batch.new, Rhs::Cut(&batch.f));
-                sweep(level, old, new, f, norm, changes);
+                sweep(level, old, new, f, changes);
                 std::mem::swap(&mut batch.old, &mut batch.new);
             }
         }
@@ -193,14 +190,14 @@ impl ThreadBatches {
 }
 
 /// Sweeps both colours, plane by plane, so that both read a plane while it is cached.
-fn sweep(level: &Level, old: &[Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
+fn sweep(level: &Level, old: &[Row], new: &mut [Row], f: Rhs<'_>, changes: &mut [f32]) {
     dispatch(
         #[inline(always)]
         || {
             for plane in 0..level.grid.dims[2] as usize {
                 for colour in 0..2 {
                     let of_cells = &mut changes[level.first_row(colour)..];
-                    jacobi_plane(level, colour, plane, old, new, f, Changes { norm, of_cells });
+                    jacobi_plane(level, colour, plane, old, new, f, of_cells);
                 }
             }
         },

@@ -35,12 +35,3 @@ pub trait BatchSolver {
     /// Size of all fields in bytes.
     fn bytes(&self) -> usize;
 }
-
-/// Preconditioner of conjugate gradients.
-pub trait Preconditioner: std::fmt::Debug + Send {
-    /// Writes an approximate solution of `A z = r` to `z`. `r` and `z` are `[n_rows]`.
-    fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>);
-
-    /// Size of all fields, bytes.
-    fn bytes(&self) -> usize;
-}

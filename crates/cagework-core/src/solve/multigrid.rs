@@ -26,11 +26,11 @@ mod stream;
 
 pub use convergence::Convergence;
 
+use super::BatchSolver;
 use super::conjugate_gradient::ConjugateGradient;
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
 use super::stop::{SolveReport, StopRule};
-use super::{BatchSolver, Preconditioner};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
@@ -161,21 +161,15 @@ impl Workspace {
             stream(passes, level, transfer, &coarse_u[0], &mut u[k], rhs, &mut []);
         }
     }
-}
 
-impl Preconditioner for Workspace {
     /// Applies one V(2,1) cycle to `A z = r`, starting from `z = 0`.
-    fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
+    pub(super) fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
         self.is_finest_dense = true;
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
         self.cycle(hierarchy, 0, DOWN_PASSES_FROM_ZERO);
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
-    }
-
-    fn bytes(&self) -> usize {
-        BatchSolver::bytes(self)
     }
 }
 
@@ -213,10 +207,13 @@ impl BatchSolver for Workspace {
             }
             if stalls {
                 let mut fallback =
-                    self.fallback.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, None)));
+                    self.fallback.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy)));
                 let (rhs, mut u) = (std::mem::take(&mut self.f[0]), std::mem::take(&mut self.u[0]));
                 let so_far = (rule, convergence.into_report());
-                let report = fallback.resume(hierarchy, self, (&mut u, &rhs), so_far, cycle_done);
+                let mut precondition =
+                    |r: &mut Vec<Row>, z: &mut Vec<Row>| self.precondition(hierarchy, r, z);
+                let report =
+                    fallback.resume(hierarchy, &mut precondition, (&mut u, &rhs), so_far, cycle_done);
                 (self.f[0], self.u[0]) = (rhs, u);
                 self.fallback = Some(fallback);
                 return report;

@@ -5,7 +5,6 @@
 //! and read the field from memory once.
 
 use crate::levels::Level;
-use crate::options::DeltaNorm;
 use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
 
 mod rhs;
@@ -251,17 +250,8 @@ pub fn residual_plane(
     *squares = sum_squares;
 }
 
-/// Sums of the changes of cells in one sweep.
-#[derive(Debug)]
-pub struct Changes<'a> {
-    /// Selects what is summed over the lanes: squares of the changes, or absolute values for [`DeltaNorm::Literal`].
-    pub norm: DeltaNorm,
-    /// Sum for each cell of the colour, to which the kernel adds.
-    pub of_cells: &'a mut [f32],
-}
-
-/// Applies Jacobi to one plane of one colour, from `old` to `new`, both `[n_rows]`. Adds the cells' changes to
-/// `changes`.
+/// Applies Jacobi to one plane of one colour, from `old` to `new`, both `[n_rows]`. Adds each cell's
+/// squared change, summed over the lanes, to `changes`, which has one number per cell of the colour.
 #[inline(always)]
 pub fn jacobi_plane(
     level: &Level,
@@ -270,10 +260,9 @@ pub fn jacobi_plane(
     old: &[Row],
     new: &mut [Row],
     rhs: Rhs<'_>,
-    changes: Changes<'_>,
+    changes: &mut [f32],
 ) {
     let (new, _) = split(level, new, colour);
-    let (is_literal, changes) = (changes.norm == DeltaNorm::Literal, changes.of_cells);
     visit_plane::<true>(
         level,
         colour,
@@ -291,7 +280,7 @@ pub fn jacobi_plane(
                 // cell. Squares below 1e-38 are denormal, which makes sweeps three times slower for changes without
                 // effect on delta.
                 let d = if d > MIN_CHANGE { d } else { 0.0 };
-                change[k] = d * if is_literal { 1.0 } else { d };
+                change[k] = d * d;
             }
             *out = new;
             changes[cell] += tree_sum(change);

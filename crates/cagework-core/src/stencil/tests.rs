@@ -41,8 +41,7 @@ fn jacobi_twin_equals_the_fast_sweeps() {
     prepared(|prepared| {
         let hierarchy = prepared.hierarchy();
         let rule = StopRule { tolerance: 1e-12, max_iterations: SWEEPS };
-        let (fields, report) =
-            jacobi::solve(hierarchy, &Team::new(1), rule, DeltaNorm::Euclidean, |_, _| true).unwrap();
+        let (fields, report) = jacobi::solve(hierarchy, &Team::new(1), rule, |_, _| true).unwrap();
         let level = &hierarchy.levels[0];
         let table = LevelTable::new(level, true);
         let mut changes = vec![0.0; level.n_rows()];
@@ -54,7 +53,7 @@ fn jacobi_twin_equals_the_fast_sweeps() {
                 jacobi_cells(0..level.n_rows(), LANES, &table, rhs.as_flattened(), &old, &mut new);
                 std::mem::swap(&mut old, &mut new);
             }
-            change_norms(LANES, DeltaNorm::Euclidean, batch == 0, &new, &old, &mut changes);
+            change_norms(LANES, batch == 0, &new, &old, &mut changes);
             assert_close(&old, field);
         }
         let delta = reduce_sum(&sum_roots(&changes)) / level.n_unknowns() as f32;

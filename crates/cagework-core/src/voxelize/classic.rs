@@ -12,8 +12,6 @@
 //!   the paper each triangle overwrites the values of its own vertices, and the sum of a cell's values can exceed 1.
 //! - Faces may be polygons of any size, with the values of [`Cage::hats_at`].
 //! - The grid extends 1/1000 cell beyond the cage's box, so that no face lies on its outermost plane.
-//! - Cells can be cubes. With the paper's rectangular cells, the average over six neighbours does not discretise
-//!   Laplace's equation.
 //! - The exterior is flooded from all outermost cells (as the paper proposes), row by row, without recursion.
 
 use glam::{DVec3, UVec3};
@@ -21,7 +19,6 @@ use glam::{DVec3, UVec3};
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, triangle_box_overlaps};
-use crate::options::CellShape;
 use crate::team::map_indices;
 
 /// Distance between the cage's box and the border of the grid, in cells.
@@ -89,12 +86,12 @@ pub struct ClassicCells {
 }
 
 /// Classifies all cells of a grid around the cage and assigns values to boundary cells. `grid`: cells along each axis
-/// of the cage's box, or along the longest one for cubic cells; 1 to 1,024.
+/// of the cage's box, 1 to 1,024.
 #[must_use]
-pub fn voxelize_classic(controls: Controls<'_>, grid: u32, shape: CellShape) -> ClassicCells {
+pub fn voxelize_classic(controls: Controls<'_>, grid: u32) -> ClassicCells {
     let cage = controls.surface();
     debug_assert!((1..=1024).contains(&grid), "cells are counted in u32");
-    let (dims, origin, cell_size) = place_grid(cage, grid, shape);
+    let (dims, origin, cell_size) = place_grid(cage, grid);
     let slices = triangles_of_slices(cage, dims, origin, cell_size);
     let marked =
         map_indices(dims.z as usize, |z| mark_slice(controls, dims, origin, cell_size, z as u32, &slices[z]));
@@ -121,20 +118,11 @@ pub fn voxelize_classic(controls: Controls<'_>, grid: u32, shape: CellShape) -> 
     ClassicCells { dims: dims.into(), origin, cell_size, kinds, boundary }
 }
 
-/// Dimensions of the classic grid, centre of its first cell, and cell size.
-pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DVec3, DVec3) {
+/// Dimensions of the classic grid, centre of its first cell, and cell size: `grid` rectangular cells along each axis of
+/// the cage's box, as in the paper.
+pub(crate) fn place_grid(cage: &Cage, grid: u32) -> (UVec3, DVec3, DVec3) {
     let (min, max) = (cage.bounds().min.as_dvec3(), cage.bounds().max.as_dvec3());
-    let extent = max - min;
-    let inner = f64::from(grid) - 2.0 * PADDING;
-    let (dims, cell_size) = match shape {
-        CellShape::Box => (UVec3::splat(grid), extent / inner),
-        CellShape::Cubic => {
-            let size = extent.max_element() / inner;
-            // Subtract a tolerance for rounding, so that the longest axis gets exactly `grid` cells.
-            let needed = (extent / size + 2.0 * PADDING - 1e-9).ceil();
-            (needed.as_uvec3().clamp(UVec3::ONE, UVec3::splat(grid)), DVec3::splat(size))
-        }
-    };
+    let (dims, cell_size) = (UVec3::splat(grid), (max - min) / (f64::from(grid) - 2.0 * PADDING));
     let corner = 0.5 * (min + max) - 0.5 * dims.as_dvec3() * cell_size;
     (dims, corner + 0.5 * cell_size, cell_size)
 }

@@ -17,9 +17,6 @@ class BindOptions(TypedDict, total=False):
     grid: int | Literal["auto"]
     method: Literal["embedded", "classic"]
     solver: Literal["multigrid", "jacobi", "cg"] | None
-    preconditioner: Literal["none", "v_cycle"]
-    cell_shape: Literal["box", "cubic"]
-    delta_norm: Literal["euclidean", "literal"]
     threads: int
     tau: float
     max_iterations: int

@@ -23,11 +23,7 @@ export const bind = {
   solver: "Solver",
   solvers: { multigrid: "Multigrid", jacobi: "Jacobi", cg: "Conj. gradients" },
   cgTip: "Conjugate gradients, on the processor",
-  preconditioned: "Preconditioned by a multigrid cycle (V-cycle)",
-  preconditionedSentence: "Each step runs one multigrid cycle: a few steps instead of a hundred.",
   options: {
-    cgPreconditioned:
-      "Conjugate gradients with a multigrid cycle in each step. Compare the curve with those of multigrid and Jacobi.",
     cg: "Conjugate gradients: no step undoes the progress of an earlier one. Compare the curve with those of multigrid and Jacobi.",
     ours: "Ours: cells are cut exactly at the cage, and coarse grids carry values over long distances.",
     oursJacobi:
@@ -43,10 +39,6 @@ export const bind = {
   limit: "Iteration limit",
   sparsify: "Drop small weights, in total up to",
   sparsifies: { 0: "Keep all", 0.00001: "1e-5 per vertex", 0.001: "1e-3 per vertex" },
-  cells: "Cells of the classic method",
-  cellShapes: { box: "Fit the cage's box", cubic: "Cubes" },
-  norm: "Change of a cell (equation 2 of K. Smith)",
-  norms: { euclidean: "Euclidean norm", literal: "As printed" },
   outside: "Vertices outside the cage",
   outsides: { extend: "Extend", stay: "Stay", refuse: "Refuse" },
   outsideTips: {
@@ -93,7 +85,6 @@ export const report = {
   methods: { embedded: "Embedded (ours)", classic: "Classic (published)" },
   short: { embedded: "Embedded", classic: "Classic" },
   solvers: { multigrid: "multigrid", jacobi: "Jacobi", cg: "conjugate gradients" },
-  vCycles: " with V-cycles",
   backends: { gpu: "GPU", cpu: "CPU" },
   boundIn: (ms: number) => `Bound in ${duration(ms)}`,
   roundOff: "At 32-bit precision",

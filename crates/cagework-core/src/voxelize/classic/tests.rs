@@ -12,9 +12,9 @@ use crate::mesh::PolygonMesh;
 /// Tolerance for f32 rounding of sums of up to eight values.
 const SUM_TOLERANCE: f32 = 1e-6;
 
-fn voxelized(mesh: &PolygonMesh, grid: u32, shape: CellShape) -> (Cage, ClassicCells) {
+fn voxelized(mesh: &PolygonMesh, grid: u32) -> (Cage, ClassicCells) {
     let cage = Cage::new(mesh).unwrap();
-    let cells = voxelize_classic((&cage).into(), grid, shape);
+    let cells = voxelize_classic((&cage).into(), grid);
     (cage, cells)
 }
 
@@ -56,42 +56,36 @@ fn assert_sound(cage: &Cage, cells: &ClassicCells, pockets: bool) {
 
 #[test]
 fn box_has_one_layer_of_boundary() {
-    for shape in [CellShape::Box, CellShape::Cubic] {
-        let (cage, cells) = voxelized(&shapes::cube(), 9, shape);
-        assert_eq!(cells.dims, [9; 3]);
-        assert_eq!(count(&cells, CellKind::Interior), 7 * 7 * 7);
-        assert_eq!(count(&cells, CellKind::Boundary), 9 * 9 * 9 - 7 * 7 * 7);
-        assert_sound(&cage, &cells, false);
-    }
+    let (cage, cells) = voxelized(&shapes::cube(), 9);
+    assert_eq!(cells.dims, [9; 3]);
+    assert_eq!(count(&cells, CellKind::Interior), 7 * 7 * 7);
+    assert_eq!(count(&cells, CellKind::Boundary), 9 * 9 * 9 - 7 * 7 * 7);
+    assert_sound(&cage, &cells, false);
 }
 
 #[test]
-fn box_cells_are_equally_many_and_cubic_cells_equally_long_per_axis() {
+fn cells_are_equally_many_per_axis() {
     let long = shapes::cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 1.0));
-    let (_, cells) = voxelized(&long, 16, CellShape::Box);
+    let (cage, cells) = voxelized(&long, 16);
     assert_eq!(cells.dims, [16; 3]);
     // The cage's box is as long as 16 cells minus the padding, which is 1/500 cell.
     assert!((cells.cell_size * (16.0 - 2.0 * PADDING) - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-12);
-    let (cage, cells) = voxelized(&long, 16, CellShape::Cubic);
-    assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells plus padding");
-    assert_eq!(cells.cell_size, DVec3::splat(cells.cell_size.x));
     assert_sound(&cage, &cells, false);
 }
 
 #[test]
 fn l_shape_has_the_kinds_of_its_outline() {
-    // 33 cells on a length of 2 (inner walls in the middle of cell 16), 17 on a height of 1.
-    let (cage, cells) = voxelized(&shapes::l_shape(), 33, CellShape::Cubic);
-    assert_eq!(cells.dims, [33, 33, 17]);
-    assert_eq!(count(&cells, CellKind::Exterior), 16 * 16 * 17);
-    assert_eq!(count(&cells, CellKind::Interior), (31 * 31 - 16 * 16) * 15);
+    // The inner walls are in the middle of cell 16.
+    let (cage, cells) = voxelized(&shapes::l_shape(), 33);
+    assert_eq!(count(&cells, CellKind::Exterior), 16 * 16 * 33);
+    assert_eq!(count(&cells, CellKind::Interior), (31 * 31 - 16 * 16) * 31);
     assert_sound(&cage, &cells, false);
 }
 
 #[test]
 fn all_eight_corners_of_an_octahedron_are_exterior() {
     // The corners are not connected: flooding from cell (0, 0, 0) alone would miss seven of them.
-    let (cage, cells) = voxelized(&shapes::octahedron(), 21, CellShape::Box);
+    let (cage, cells) = voxelized(&shapes::octahedron(), 21);
     for corner in 0..8usize {
         let at = |axis: usize| (corner >> axis & 1) * 20;
         assert_eq!(cells.kinds[at(0) + 21 * (at(1) + 21 * at(2))], CellKind::Exterior);
@@ -103,7 +97,7 @@ fn all_eight_corners_of_an_octahedron_are_exterior() {
 fn cavity_is_enclosed_and_counts_as_interior() {
     // As in K. Smith's paper, cells that the flood of the exterior does not reach are interior.
     let hollow = shapes::together(&shapes::cube(), &shapes::cuboid(Vec3::splat(0.3), Vec3::splat(0.7)));
-    let (_, cells) = voxelized(&hollow, 21, CellShape::Box);
+    let (_, cells) = voxelized(&hollow, 21);
     assert_eq!(count(&cells, CellKind::Exterior), 0);
     assert_eq!(cells.kinds[10 + 21 * (10 + 21 * 10)], CellKind::Interior);
 }
@@ -111,7 +105,7 @@ fn cavity_is_enclosed_and_counts_as_interior() {
 #[test]
 fn boundary_values_are_those_of_the_closest_triangle_in_the_cell() {
     for mesh in [shapes::octahedron(), shapes::l_shape()] {
-        let (cage, cells) = voxelized(&mesh, 11, CellShape::Box);
+        let (cage, cells) = voxelized(&mesh, 11);
         for cell in 0..cells.kinds.len() {
             let center = center(&cells, cell);
             let mut closest: Option<(f64, u32, [f64; 3])> = None;
@@ -145,7 +139,7 @@ fn one_thread_and_many_give_the_same_cells() {
     let cage = Cage::new(&shapes::c_shape()).unwrap();
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| voxelize_classic((&cage).into(), 40, CellShape::Cubic))
+        pool.install(|| voxelize_classic((&cage).into(), 40))
     };
     assert_eq!(on(1), on(4));
 }
@@ -155,15 +149,14 @@ proptest! {
 
     #[test]
     fn exterior_never_leaks_into_rotated_cages(
-        axis in [-1.0..1.0f32, -1.0..1.0, 0.1..1.0], angle in 0.0..6.3f32, grid in 1..30u32, cubic in any::<bool>(),
+        axis in [-1.0..1.0f32, -1.0..1.0, 0.1..1.0], angle in 0.0..6.3f32, grid in 1..30u32,
     ) {
         let turn = Quat::from_axis_angle(Vec3::from(axis).normalize(), angle);
         let mut mesh = shapes::c_shape();
         for p in &mut mesh.positions {
             *p = turn * *p + Vec3::new(7.0, 0.0, -3.0);
         }
-        let shape = if cubic { CellShape::Cubic } else { CellShape::Box };
-        let (cage, cells) = voxelized(&mesh, grid, shape);
+        let (cage, cells) = voxelized(&mesh, grid);
         assert_sound(&cage, &cells, true);
     }
 }
