@@ -40,18 +40,12 @@ impl Input {
     /// If only one of the two files is named, or a file cannot be read.
     #[must_use]
     pub fn load() -> Self {
-        let [mesh, cage] =
-            ["CAGEWORK_BENCH_MESH", "CAGEWORK_BENCH_CAGE"].map(|name| std::env::var(name).ok());
-        let input = match (mesh, cage) {
-            (None, None) => Self {
+        let input = match files_of_environment() {
+            None => Self {
                 points: creature().positions,
                 cage: Cage::new(&creature_cage()).expect("the generated cage is one"),
             },
-            (Some(mesh), Some(cage)) => Self {
-                points: read(&mesh).tri_mesh().positions,
-                cage: Cage::new(&read(&cage).cage_mesh()).expect("CAGEWORK_BENCH_CAGE is a cage"),
-            },
-            _ => panic!("set both CAGEWORK_BENCH_MESH and CAGEWORK_BENCH_CAGE, or neither"),
+            Some((model, cage)) => Self { points: model.tri_mesh().positions, cage },
         };
         println!("{} vertices, {}-vertex cage", input.points.len(), input.cage.n_vertices());
         input
@@ -82,6 +76,22 @@ impl Input {
         let sampler =
             Sampler::new((&self.cage).into(), &hierarchy.levels[0], &overlaps, OutsidePolicy::Extend);
         sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
+    }
+}
+
+/// Reads the model and the cage that the environment names. Returns `None` if it names neither.
+///
+/// # Panics
+/// If only one of the two files is named, or a file cannot be read.
+#[must_use]
+pub fn files_of_environment() -> Option<(Model, Cage)> {
+    match ["CAGEWORK_BENCH_MESH", "CAGEWORK_BENCH_CAGE"].map(|name| std::env::var(name).ok()) {
+        [None, None] => None,
+        [Some(mesh), Some(cage)] => {
+            let cage = Cage::new(&read(&cage).cage_mesh()).expect("CAGEWORK_BENCH_CAGE is a cage");
+            Some((read(&mesh), cage))
+        }
+        _ => panic!("set both CAGEWORK_BENCH_MESH and CAGEWORK_BENCH_CAGE, or neither"),
     }
 }
 

@@ -82,11 +82,6 @@ pub(crate) enum Command {
     Cage(CageArgs),
     /// List the faults of a cage and repair them.
     Check(CheckArgs),
-    /// Time the published method and the default method, on one thread and on all threads.
-    Bench(BenchArgs),
-    /// Repeat the evaluation of K. Smith's paper, which describes the published method: times, errors and reconstructions,
-    /// as CSV, SVG, GLB and a text report.
-    Evaluate(EvaluateArgs),
     /// Bind and deform the built-in sample.
     Demo(DemoArgs),
 }
@@ -266,47 +261,6 @@ pub(crate) struct PullArgs {
     /// Grabs, pins and their targets, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) job: PathBuf,
-}
-
-/// Arguments of `cagework bench`.
-#[derive(Args, Debug)]
-#[command(after_help = "Without a mesh, the built-in sample is timed.\n\n\
-    Examples:\n  cagework bench\n  cagework bench horse.obj --cage cage.obj -g 32,64,128 --runs 5 --json")]
-pub(crate) struct BenchArgs {
-    /// Mesh to bind.
-    #[arg(requires = "cage", help = mesh_help("Mesh to bind"))]
-    pub(crate) mesh: Option<PathBuf>,
-    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
-    #[arg(long, value_name = "CAGE", requires = "mesh")]
-    pub(crate) cage: Option<CageSource>,
-    /// Numbers of cells along the longest side of the cage, separated by commas; each is timed.
-    #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = number::<u32>(options::GRID))]
-    pub(crate) grid: Vec<u32>,
-    /// Timed binds per case; medians are reported.
-    #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) runs: u32,
-}
-
-/// Arguments of `cagework evaluate`.
-#[derive(Args, Debug)]
-#[command(after_help = "Examples:\n  cagework evaluate\n  cagework evaluate --runs 5 -o evening\n  \
-    cagework evaluate --mesh horse.obj --cage cage.obj -g 32 -o horse")]
-pub(crate) struct EvaluateArgs {
-    /// Mesh to bind [default: the built-in sample].
-    #[arg(long, requires = "cage")]
-    pub(crate) mesh: Option<PathBuf>,
-    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS [default: the sample's own cage].
-    #[arg(long, value_name = "CAGE")]
-    pub(crate) cage: Option<CageSource>,
-    /// Cells of the finest grid along the longest side of the cage; grids of half and a quarter of that are run as well.
-    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(32..=512))]
-    pub(crate) grid: u32,
-    /// Folder to write to; created if it does not exist.
-    #[arg(short, long, value_name = "FOLDER", default_value = "evaluation")]
-    pub(crate) output: PathBuf,
-    /// Timed binds per case. The median is reported; a speed-up is claimed only if the ranges of times do not overlap.
-    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub(crate) runs: u32,
 }
 
 /// Arguments of `cagework demo`.

@@ -6,7 +6,7 @@ use cagework_core::bind::{BindError, Binding, weights_bytes};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
 use cagework_core::{Cage, Controls, bind};
-use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
+use cagework_gpu::bind_on;
 use cagework_io::{Model, ModelFormat, ReshapeOptions, write_weights_npz};
 use glam::{DVec3, Vec3};
 
@@ -138,24 +138,11 @@ pub(crate) fn bind_positions(
 ) -> Result<Binding, CliError> {
     if on_gpu {
         let context = gpu::open()?;
-        return bind_on(&context, positions, controls, options);
+        let bar = Bar::start();
+        return Ok(pollster::block_on(bind_on(positions, controls, options, &bar, &context))?);
     }
     let bar = Bar::start();
     Ok(bind(positions, controls, options, &bar)?)
-}
-
-/// Binds positions on a GPU, with a progress bar.
-///
-/// # Errors
-/// If the bind fails or is cancelled.
-pub(crate) fn bind_on(
-    context: &GpuContext,
-    positions: &[Vec3],
-    controls: Controls<'_>,
-    options: &BindOptions,
-) -> Result<Binding, CliError> {
-    let bar = Bar::start();
-    Ok(pollster::block_on(bind_on_gpu(positions, controls, options, &bar, context))?)
 }
 
 /// Deforms the bound points by posed controls. `[n_points]`, object units.

@@ -59,9 +59,9 @@ pub(crate) enum CliError {
     /// Closed-form coordinates could not be computed.
     #[error(transparent)]
     ClosedForm(#[from] ClosedFormError),
-    /// A plot or picture could not be drawn or encoded.
-    #[error("a plot cannot be drawn: {message}")]
-    Plot { message: String },
+    /// A picture could not be encoded.
+    #[error("a picture cannot be encoded: {message}")]
+    Picture { message: String },
     /// Files do not match each other, an output would overwrite an input, or arguments are in conflict.
     #[error("{message}")]
     Mismatch {

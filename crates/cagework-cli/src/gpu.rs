@@ -106,7 +106,7 @@ fn decode(image: &LookImage, side: u32) -> Result<(DrawTexture, Option<String>),
 /// # Errors
 /// If the number of bytes does not match the size, or encoding fails.
 pub(crate) fn png(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, CliError> {
-    let failed = |message: String| CliError::Plot { message };
+    let failed = |message: String| CliError::Picture { message };
     let picture = image::RgbaImage::from_raw(width, height, rgba)
         .ok_or_else(|| failed(format!("the pixels do not fill {width} x {height}")))?;
     // Drop the alpha channel, because pictures are opaque; the file is then a quarter smaller.

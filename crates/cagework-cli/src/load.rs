@@ -90,7 +90,7 @@ pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Re
     Ok(model)
 }
 
-/// The built-in sample, which `demo`, `bench` and `evaluate` use by default.
+/// The built-in sample, which `demo` binds.
 #[derive(Debug)]
 pub(crate) struct BuiltInSample {
     /// Identifier of the sample, such as `rat`.

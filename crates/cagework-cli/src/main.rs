@@ -4,7 +4,6 @@
 //! line.
 
 mod args;
-mod bench;
 mod bind;
 mod cage;
 mod capture;
@@ -15,7 +14,6 @@ mod deform;
 mod demo;
 mod dynamic;
 mod error;
-mod evaluate;
 mod field;
 mod files;
 mod fit;
@@ -59,8 +57,6 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
-        Command::Bench(args) => bench::run(args, cli.json),
-        Command::Evaluate(args) => evaluate::run(args, cli.json),
         Command::Demo(args) => demo::run(args, cli.json),
     };
     match outcome {

@@ -3,14 +3,13 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 
 mod bad_input;
-mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod cages;
 mod controls;
 mod deform;
+mod demo;
 mod documents;
-mod evaluate;
 mod field;
 mod fit;
 #[cfg(unix)]

@@ -7,7 +7,7 @@ use crate::support::Sandbox;
 fn version_and_help_succeed() {
     let sandbox = Sandbox::new();
     sandbox.run("--version").success().stdout(contains(env!("CARGO_PKG_VERSION")));
-    for command in ["", "info", "bind", "deform", "refit", "transfer", "cage", "bench", "demo"] {
+    for command in ["", "info", "bind", "deform", "refit", "transfer", "cage", "demo"] {
         sandbox
             .run(&format!("{command} --help"))
             .success()
@@ -25,7 +25,6 @@ fn help_lists_the_formats_that_a_command_takes() {
         ("transfer", false),
         ("check", false),
         ("fit", false),
-        ("bench", false),
         ("deform", true),
         ("pull", true),
         ("info", true),
@@ -95,7 +94,6 @@ fn invalid_command_line_exits_with_2() {
         "deform mesh.obj --cage cage.obj --weights w.npz -o out.glb",
         "cage mesh.obj -o cage2.fbx",
         "refit --cage cage.obj --pose cage.obj -o out",
-        "bench mesh.obj",
     ] {
         sandbox.run(args).code(2).stdout("").stderr(contains("Usage").or(contains("--help")));
     }

@@ -1,10 +1,14 @@
-//! Tests that `cagework evaluate` writes all its files, and that the findings of the report agree with its tables.
+//! Tests that an evaluation makes all files, and that the findings of the report agree with its tables.
 
 use std::collections::HashMap;
 
-use predicates::str::contains;
+use cagework_core::{Bounds, Cage, PolygonMesh, subdivided_box};
+use cagework_gpu::GpuError;
+use cagework_io::Model;
+use cagework_tests::creature::creature;
+use glam::DVec3;
 
-use crate::support::{Sandbox, glb_json};
+use super::*;
 
 /// Grids that an evaluation with `-g 32` runs.
 const GRIDS: [u32; 3] = [8, 16, 32];
@@ -69,25 +73,38 @@ fn assert_well_formed(name: &str, bytes: &[u8]) {
     assert!(text.contains("<text") && text.len() > 1000, "{name} has no content");
 }
 
+/// Evaluates the animal in a box with 32 cells. Runs without a GPU: Jacobi sweeps on a software adapter would double the
+/// time of these tests.
+fn evaluated(runs: u32) -> HashMap<String, Vec<u8>> {
+    let animal = creature();
+    let bounds = Bounds::of(&animal.positions).unwrap();
+    let faces = animal.triangles.iter().map(|t| t.to_vec()).collect();
+    let mesh = PolygonMesh { positions: animal.positions, faces };
+    let model = Model::of_mesh("animal.obj", &mesh, DVec3::ZERO).unwrap();
+    let cage = Cage::new(&subdivided_box(bounds, 0.1, [1; 3])).unwrap();
+    let input = Input { name: "animal".to_owned(), model, cage };
+    let gpu = Err(GpuError::NoAdapter { reason: "not used by this test".to_owned() });
+    let evaluation = Evaluation::run(&input, (32, runs), gpu.as_ref()).unwrap();
+    all(&input, &evaluation).unwrap().into_iter().collect()
+}
+
 #[test]
-fn evaluation_writes_all_files_and_reports_what_it_measured() {
-    let sandbox = Sandbox::with_sphere_in_box();
-    // Run without a GPU: Jacobi sweeps on a software adapter would double the time of these tests.
-    let mut command = sandbox.command("evaluate --mesh mesh.obj --cage cage.obj -g 32 --runs 3 -o out");
-    command.env("CAGEWORK_ADAPTER", "no such adapter").assert().success().stdout(contains("out/report.md"));
-    let report = String::from_utf8(sandbox.read("out/report.md")).unwrap();
+fn evaluation_makes_all_files_and_reports_what_it_measured() {
+    let files = evaluated(3);
+    let report = String::from_utf8(files["report.md"].clone()).unwrap();
     for number in 7..=12 {
-        let name = format!("out/figure-{number}.svg");
-        assert_well_formed(&name, &sandbox.read(&name));
-        assert!(report.contains(&format!("(figure-{number}.svg)")), "{name} is not in the report");
+        let name = format!("figure-{number}.svg");
+        assert_well_formed(&name, &files[&name]);
+        assert!(report.contains(&format!("({name})")), "{name} is not in the report");
     }
     for figure in ["figure-2", "figure-3", "figure-4", "figure-5-ours"] {
-        glb_json(&sandbox.read(&format!("out/{figure}.glb")));
-        assert!(report.contains(&format!("| {figure}.glb |")));
+        let name = format!("{figure}.glb");
+        Model::read(&name, &files[&name], &mut |_| None).unwrap();
+        assert!(report.contains(&format!("| {name} |")));
     }
-    assert_times_agree(&report, &csv(&sandbox.read("out/time.csv")));
-    assert_errors_agree(&report, &csv(&sandbox.read("out/error.csv")));
-    let delta = csv(&sandbox.read("out/delta.csv"));
+    assert_times_agree(&report, &csv(&files["time.csv"]));
+    assert_errors_agree(&report, &csv(&files["error.csv"]));
+    let delta = csv(&files["delta.csv"]);
     let deltas: Vec<f64> = delta
         .iter()
         .filter(|r| r["implementation"] == "paper-one-thread")
@@ -172,10 +189,7 @@ fn assert_errors_agree(report: &str, table: &Table) {
 
 #[test]
 fn report_of_a_single_run_calls_no_time_shorter() {
-    let sandbox = Sandbox::with_sphere_in_box();
-    let mut command = sandbox.command("evaluate --mesh mesh.obj --cage cage.obj -g 32 --runs 1 -o out");
-    command.env("CAGEWORK_ADAPTER", "no such adapter").assert().success();
-    let report = String::from_utf8(sandbox.read("out/report.md")).unwrap();
+    let report = String::from_utf8(evaluated(1).remove("report.md").unwrap()).unwrap();
     assert!(!report.contains("times as fast") && !report.contains("is reversed"), "{report}");
     for g in &GRIDS[1..] {
         let threaded = line(&report, "Threaded smoothing", &format!("g = {g}:"));

@@ -185,7 +185,7 @@ fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
 pub(super) fn report(evaluation: &Evaluation) -> String {
     let mut out = format!(
         "# The evaluation of K. Smith's paper, repeated\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
-         {} (voxelize, solve, sample).\nMade by `cagework evaluate`, version {}.\n\n\
+         {} (voxelize, solve, sample).\nMade by the program `evaluate` of cagework-benches, version {}.\n\n\
          ## Findings\n\n{}\n",
         evaluation.mesh,
         evaluation.n_vertices,

@@ -1,9 +1,7 @@
 //! Ranges of repeated time measurements, and comparisons of such ranges.
 
-use serde::Serialize;
-
 /// Shortest and longest of repeated time measurements, and their number.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spread {
     pub(super) n: u32,
     pub(super) min: f64,

@@ -2,22 +2,18 @@
 //! grids. Figures are numbered as in the paper, which the parent module names.
 
 use cagework_core::Frames;
-use cagework_core::bind::Binding;
+use cagework_core::bind::{Binding, bind};
 use cagework_core::options::{BindOptions, Method, Solver};
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindReport, Cage, Weights};
-use cagework_gpu::{GpuContext, GpuError};
+use cagework_gpu::{GpuContext, GpuError, bind_on};
 use cagework_io::Model;
-use serde::Serialize;
-
-use crate::args::EvaluateArgs;
-use crate::bind::{bind_model, bind_on};
-use crate::error::CliError;
+use pollster::block_on;
 
 use super::spread::Spread;
 
 /// A combination of method, solver, and number of threads or GPU.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Implementation {
     /// The paper's algorithm on one thread.
     PaperOneThread,
@@ -107,7 +103,7 @@ impl Implementation {
 }
 
 /// Result of one or more binds with the same options.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub(super) struct Run {
     pub(super) implementation: Implementation,
     /// Report of the bind that has the median total time.
@@ -148,6 +144,18 @@ pub(super) struct Reconstruction {
     pub(super) frames: Frames,
 }
 
+/// Names and contents of files.
+pub(super) type Files = Vec<(String, Vec<u8>)>;
+
+/// A model in a cage.
+#[derive(Debug)]
+pub(super) struct Input {
+    /// Name of the model in the report.
+    pub(super) name: String,
+    pub(super) model: Model,
+    pub(super) cage: Cage,
+}
+
 /// Results of the whole evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
@@ -164,19 +172,6 @@ pub(super) struct Evaluation {
     /// Runs of figure 12, which shows the error at rest.
     pub(super) errors: Vec<Run>,
     pub(super) reconstructions: Vec<Reconstruction>,
-}
-
-/// Output of `--json`.
-#[derive(Debug, Serialize)]
-pub(super) struct Summary<'a> {
-    mesh: &'a str,
-    vertices: usize,
-    cage_vertices: usize,
-    threads: usize,
-    adapter: Option<&'a str>,
-    runs: u32,
-    timed: &'a [Run],
-    errors: &'a [Run],
 }
 
 /// Convergence thresholds of figures 8 to 11.
@@ -209,25 +204,24 @@ impl Grids {
 }
 
 impl Evaluation {
-    /// Runs all binds of the evaluation.
+    /// Runs all binds of the evaluation. `finest`: cells of the finest grid along the longest side of the cage; `runs`:
+    /// timed binds per case.
     pub(super) fn run(
-        name: &str,
-        model: &Model,
-        cage: &Cage,
-        args: &EvaluateArgs,
+        Input { name, model, cage }: &Input,
+        (finest, runs): (u32, u32),
         gpu: Result<&GpuContext, &GpuError>,
-    ) -> Result<Self, CliError> {
-        let bind = |implementation: Implementation, grid, tau| -> Result<Binding, CliError> {
+    ) -> Result<Self, GpuError> {
+        let bind = |implementation: Implementation, grid, tau| -> Result<Binding, GpuError> {
             eprintln!("{}, g = {grid}, tau = {tau:e}", implementation.name());
             let options = implementation.options(grid, tau);
             match gpu {
                 Ok(context) if implementation.is_gpu() => {
-                    bind_on(context, &model.positions, cage.into(), &options)
+                    block_on(bind_on(&model.positions, cage, &options, &NoProgress, context))
                 }
-                _ => bind_model(model, cage, &options),
+                _ => Ok(bind(&model.positions, cage, &options, &NoProgress)?),
             }
         };
-        let grids = Grids::up_to(args.grid);
+        let grids = Grids::up_to(finest);
         let (mut timed, mut errors) = (Vec::new(), Vec::new());
         for grid in grids.timed() {
             for tau in TIMED_TAUS {
@@ -235,14 +229,14 @@ impl Evaluation {
                     Implementation::ALL.into_iter().filter(|w| gpu.is_ok() || !w.is_gpu()).collect();
                 let mut reports = vec![Vec::new(); implementations.len()];
                 // Run the implementations in turn, so that a change of the machine's speed affects all of them equally.
-                for _ in 0..args.runs {
+                for _ in 0..runs {
                     for (&implementation, reports) in implementations.iter().zip(&mut reports) {
                         reports.push(bind(implementation, grid, tau)?.report);
                     }
                 }
-                let runs = implementations.into_iter().zip(reports);
+                let reports = implementations.into_iter().zip(reports);
                 timed.extend(
-                    runs.filter_map(|(implementation, reports)| Run::median(implementation, reports)),
+                    reports.filter_map(|(implementation, reports)| Run::median(implementation, reports)),
                 );
             }
         }
@@ -265,13 +259,13 @@ impl Evaluation {
                 let Binding { weights, frames, report, .. } = bind(implementation, grid, tau)?;
                 Ok(Reconstruction { figure, caption, report, weights, frames })
             })
-            .collect::<Result<_, CliError>>()?;
+            .collect::<Result<_, GpuError>>()?;
         Ok(Self {
-            mesh: name.to_owned(),
+            mesh: name.clone(),
             n_vertices: model.positions.len(),
             n_cage: cage.n_vertices(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
-            runs: args.runs,
+            runs,
             grids,
             adapter: gpu.map(GpuContext::adapter_name).map_err(ToString::to_string),
             timed,
@@ -301,18 +295,5 @@ impl Evaluation {
                 run.implementation == implementation && run.report.grid == grid && run.report.tau == tau
             })
             .map(|run| run.report.rest_error.mean_rel)
-    }
-
-    pub(super) fn summary(&self) -> Summary<'_> {
-        Summary {
-            mesh: &self.mesh,
-            vertices: self.n_vertices,
-            cage_vertices: self.n_cage,
-            threads: self.threads,
-            adapter: self.adapter.as_deref().ok(),
-            runs: self.runs,
-            timed: &self.timed,
-            errors: &self.errors,
-        }
     }
 }

@@ -1,8 +1,8 @@
 //! Draws figures 7 to 12 of the evaluation as SVG.
 
-use plotters::prelude::*;
+use std::error::Error;
 
-use crate::error::CliError;
+use plotters::prelude::*;
 
 use super::cases::{ERROR_TAUS, Evaluation, Implementation, TIMED_TAUS};
 
@@ -23,22 +23,21 @@ const COLOURS: [RGBColor; 8] = [
 
 const FONT: (&str, u32) = ("sans-serif", 15);
 
-type Plot = Result<String, Box<dyn std::error::Error>>;
+type Plot = Result<String, Box<dyn Error>>;
 
 /// Draws all plots. Returns (file name, SVG text) pairs.
 ///
 /// # Errors
 /// If a plot cannot be drawn.
-pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliError> {
-    let failed = |error: Box<dyn std::error::Error>| CliError::Plot { message: error.to_string() };
+pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, Box<dyn Error>> {
     let mut plots = vec![
-        ("figure-7.svg".to_owned(), delta(evaluation).map_err(failed)?),
-        ("figure-12.svg".to_owned(), error(evaluation).map_err(failed)?),
+        ("figure-7.svg".to_owned(), delta(evaluation)?),
+        ("figure-12.svg".to_owned(), error(evaluation)?),
     ];
     let mut number = 8;
     for grid in evaluation.grids.timed() {
         for tau in TIMED_TAUS {
-            plots.push((format!("figure-{number}.svg"), times(evaluation, grid, tau).map_err(failed)?));
+            plots.push((format!("figure-{number}.svg"), times(evaluation, grid, tau)?));
             number += 1;
         }
     }

@@ -1,16 +1,15 @@
 //! Draws figures 2 to 6 of the evaluation as PNG files.
 
-use cagework_core::Cage;
-use cagework_gpu::render::{MeshStyle, SceneOptions, Theme, ViewOptions};
+use std::error::Error;
+use std::io::Cursor;
+
+use cagework_core::{Cage, TriMesh};
+use cagework_gpu::render::{DrawModel, MeshStyle, SceneOptions, Theme, ViewOptions};
 use cagework_gpu::{GpuContext, Session};
-use cagework_io::Model;
 use glam::{Quat, Vec3};
 use pollster::block_on;
 
-use crate::error::CliError;
-use crate::gpu::{draw_model, png};
-
-use super::cases::Evaluation;
+use super::cases::{Evaluation, Files, Input};
 
 /// Width and height of each picture, pixels.
 const SIZE: [u32; 2] = [720, 540];
@@ -18,18 +17,18 @@ const SIZE: [u32; 2] = [720, 540];
 /// Angle by which the cage of figure 6 is bent over its whole length, radians.
 const BEND_ANGLE: f32 = 0.9;
 
-/// Draws all pictures. Returns (file name, PNG bytes) pairs.
+/// Draws all pictures, without textures.
 ///
 /// # Errors
-/// If the GPU fails.
+/// If the GPU fails, or a picture cannot be encoded.
 pub(super) fn all(
     context: GpuContext,
-    model: &Model,
-    cage: &Cage,
+    Input { model, cage, .. }: &Input,
     evaluation: &Evaluation,
-) -> Result<Vec<(String, Vec<u8>)>, CliError> {
+) -> Result<Files, Box<dyn Error>> {
     let mut session = Session::new(context);
-    block_on(session.set_model(draw_model(model).0))?;
+    let TriMesh { positions, triangles } = model.tri_mesh();
+    block_on(session.set_model(DrawModel::plain(positions, triangles)))?;
     let view = ViewOptions { theme: Theme::Light, floor: false, ..ViewOptions::default() };
     let bare = SceneOptions { view, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.camera_mut().set_viewport(glam::Vec2::from(SIZE.map(|s| s as f32)));
@@ -42,15 +41,25 @@ pub(super) fn all(
     for r in &evaluation.reconstructions {
         block_on(session.adopt(r.weights.clone(), r.frames.clone()))?;
         let rgba = block_on(session.picture(SIZE, 1.0))?;
-        pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
+        pictures.push((format!("{}.png", r.figure), png(rgba)?));
     }
     // Figure 6 uses the weights of the last reconstruction, which is that of the embedded method.
     session.set_scene(SceneOptions { cage_lines: true, handles: true, ..bare });
     session.pose(&bent_cage(cage));
     session.frame_all();
     let rgba = block_on(session.picture(SIZE, 1.0))?;
-    pictures.push(("figure-6.png".to_owned(), png(rgba, SIZE)?));
+    pictures.push(("figure-6.png".to_owned(), png(rgba)?));
     Ok(pictures)
+}
+
+/// Encodes RGBA pixels as a PNG without the alpha channel.
+fn png(rgba: Vec<u8>) -> Result<Vec<u8>, Box<dyn Error>> {
+    let [width, height] = SIZE;
+    let picture =
+        image::RgbaImage::from_raw(width, height, rgba).ok_or("the pixels do not fill the picture")?;
+    let mut bytes = Cursor::new(Vec::new());
+    image::DynamicImage::from(picture).into_rgb8().write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
 }
 
 /// Bends the cage upwards at both ends of its longest horizontal axis. Returns the positions of its vertices,
