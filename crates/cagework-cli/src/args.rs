@@ -9,7 +9,6 @@ mod pose;
 mod proportions;
 mod render;
 mod rig;
-mod size;
 mod solve;
 mod transfer;
 
@@ -33,7 +32,6 @@ pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use proportions::ProportionsArgs;
 pub(crate) use render::{RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
-pub(crate) use size::SizeArgs;
 pub(crate) use solve::{MemoryArgs, SolveArgs};
 pub(crate) use transfer::TransferArgs;
 
@@ -230,8 +228,6 @@ pub(crate) struct DeformArgs {
     pub(crate) lattice_cells: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
-    #[command(flatten)]
-    pub(crate) size: SizeArgs,
     /// Experimental: apply the clip to the model first, then bend every frame with the cage. Writes the frames as morph
     /// targets, without a skeleton.
     #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only", "ground", "feet"])]

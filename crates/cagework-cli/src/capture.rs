@@ -74,7 +74,7 @@ pub(crate) fn deform(
         ));
     }
     notices.extend(model.lost_in(output.format));
-    write(&output.path, &args.size.apply(bytes, &output.path)?)?;
+    write(&output.path, &bytes)?;
     let summary = CaptureSummary {
         output: output.path.display().to_string(),
         points,

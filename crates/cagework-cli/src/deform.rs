@@ -54,9 +54,6 @@ struct DeformSummary {
 /// # Errors
 /// If a file cannot be read or written, or files do not match.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
-    if let Some(output) = &args.output {
-        args.size.check(output)?;
-    }
     if let (Some(clip), Some(output)) = (&args.dynamic, &args.output) {
         return dynamic::run(args, clip, output, as_json);
     }
@@ -199,7 +196,7 @@ fn deform(
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
     notices.extend(model.copies_in(format, &bytes));
-    write(output, &args.size.apply(bytes, output)?)?;
+    write(output, &bytes)?;
 
     let summary = DeformSummary {
         output: output.display().to_string(),

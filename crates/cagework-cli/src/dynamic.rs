@@ -69,7 +69,7 @@ pub(crate) fn run(
     frames.iter_mut().chain([&mut at_rest]).for_each(|frame| bend_vertices(&field, frame));
     let n = frames.len();
     let bytes = model.write_baked(number, &at_rest, frames).map_err(|e| CliError::file(output, e))?;
-    write(output, &args.size.apply(bytes, output)?)?;
+    write(output, &bytes)?;
     let summary = DynamicSummary {
         output: output.display().to_string(),
         clip: clip.to_owned(),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use cagework_core::field::bend_vertices;
 use cagework_core::{InnerControls, PolygonMesh};
 use cagework_io::{
-    Feet, Ground, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, compact, shown,
-    write_cage_obj, write_inner_controls, write_weights_npz,
+    Feet, Ground, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, shown, write_cage_obj,
+    write_inner_controls, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 
@@ -34,11 +34,10 @@ impl BoundDocument<'_> {
         if let Some(capture) = self.posed_capture(id, ModelFormat::Gltf)? {
             return Ok(capture);
         }
-        let Exported { bytes, notices } = match clip {
-            Some(clip) if options.dynamic => self.baked(id, clip)?,
-            _ => self.posed_glb(id, options)?,
-        };
-        Ok(Exported { bytes: compact(bytes, options.size)?, notices })
+        match clip {
+            Some(clip) if options.dynamic => self.baked(id, clip),
+            _ => self.posed_glb(id, options),
+        }
     }
 
     /// Fits a file of clips without a mesh to the posed skeleton of the model with the most joints. Matches joints by
@@ -70,7 +69,7 @@ impl BoundDocument<'_> {
         let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
         let by = vec![DVec3::ZERO; clips.extra_points()?.len()];
         let (bytes, report) = clips.write_reshaped(&by, &[], &[], &options)?;
-        Ok(Exported { bytes: compact(bytes, request.size)?, notices: report.notices() })
+        Ok(Exported { bytes, notices: report.notices() })
     }
 
     /// Exports the posed model in a format that stores only its shape, without rig or animation. `shown`: exports the
@@ -106,15 +105,14 @@ impl BoundDocument<'_> {
         let poses = self.document().fitting_poses();
         let named: Vec<_> = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec())).collect();
         if let Some((bytes, _)) = self.reshaped(id, self.rest(), &named, request)? {
-            return Ok(compact(bytes, request.size)?);
+            return Ok(bytes);
         }
         let member = self.document().models.get(id)?;
         let own =
             |(name, pose): (String, Vec<Vec3>)| Ok((name, member.share(&self.deformed(&pose)?).to_vec()));
         let named = named.into_iter().map(own).collect::<Result<Vec<_>, BoundError>>()?;
         let timeline = self.document().timeline();
-        let glb = member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?;
-        Ok(compact(glb, request.size)?)
+        Ok(member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?)
     }
 
     /// Exports the weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
@@ -152,7 +150,7 @@ impl BoundDocument<'_> {
         if self.document().models.splats().is_none() { Ok(()) } else { Err(BoundError::Capture) }
     }
 
-    /// Exports a posed model as GLB, not compacted.
+    /// Exports a posed model as GLB.
     pub(crate) fn posed_glb(&self, id: u32, request: &RigOptions) -> Result<Exported, BoundError> {
         let pose = &self.document().pose;
         if let Some((bytes, report)) = self.reshaped(id, pose, &[], request)? {

@@ -1,7 +1,7 @@
 //! Editing tools and the ranges of their radii; options of exports.
 
 use cagework_core::options::{Number, Slider};
-use cagework_io::{CompactOptions, ReshapeOptions};
+use cagework_io::ReshapeOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::edit::{Element, Pivot};
@@ -38,9 +38,6 @@ pub struct RigOptions {
     /// Options of joints, clips and the ground.
     #[serde(flatten)]
     pub reshape: ReshapeOptions,
-    /// Options that reduce the size of the file.
-    #[serde(flatten)]
-    pub size: CompactOptions,
     /// Whether to export only the shape, without the rig.
     pub plain: bool,
     /// Whether the cage deforms the model after a clip has moved it.

@@ -180,7 +180,7 @@ mod tests {
         saved["cage"]["target"] = json!(120);
         saved["rig"] = json!({
             "joints": "stay", "keep_travel": true, "ground": true, "feet": "lock", "rigid": ["hat"],
-            "expressions": true, "quantize": true, "compress": "meshopt", "plain": false, "dynamic": true,
+            "expressions": true, "plain": false, "dynamic": true,
         });
         saved["symmetry"] = json!(true);
         let settings = read(&saved);

@@ -13,8 +13,7 @@ use cagework_core::options::Choice;
 use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, n_harmonics};
 use cagework_io::{
-    CompactOptions, Compression, Interpolation, Model, ModelFormat, Player, ReshapeOptions, Timeline,
-    TransferOptions, compact, write_mesh_glb,
+    Interpolation, Model, ModelFormat, Player, ReshapeOptions, Timeline, TransferOptions, write_mesh_glb,
 };
 use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::{DVec3, Quat, Vec3};
@@ -120,13 +119,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (stands, _) = model.write_reshaped(&by, &[], &[], &grounded)?;
             played(&stands, &format!("{stem}-stands"))?;
             std::fs::write(directory.join(format!("{stem}-stands.glb")), stands)?;
-            for (word, compress) in Compression::ALL {
-                let small =
-                    compact(reshaped.clone(), CompactOptions { quantize: true, compress: *compress })?;
-                let name = format!("{stem}-quantized-{word}");
-                played(&small, &name)?;
-                std::fs::write(directory.join(format!("{name}.glb")), small)?;
-            }
             std::fs::write(directory.join(format!("{stem}-reshaped.glb")), reshaped)?;
             let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;
             std::fs::write(directory.join(format!("{stem}-posed.glb")), posed)?;

@@ -48,8 +48,6 @@ pub use gltf::{
     Clip, Feet, GltfError, Ground, JointPoint, Joints, PROJECT_EXTENSION, Player, ReshapeOptions,
     ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,
 };
-#[cfg(feature = "compress")]
-pub use gltf::{CompactOptions, Compression, compact};
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{

@@ -12,7 +12,6 @@ import { join } from "node:path";
 globalThis.self = globalThis;
 const { AnimationMixer, Vector3 } = await import("three");
 const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
-const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
 
 /** Largest difference as a fraction of the model's size. three.js computes in doubles, but the file stores floats. */
 const LIMIT = 5e-7;
@@ -26,7 +25,7 @@ if (directory === undefined) {
 async function load(name) {
   const glb = readFileSync(join(directory, `${name}.glb`));
   const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength);
-  return await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
+  return await new GLTFLoader().parseAsync(bytes, "");
 }
 
 /** Pairs of a morph target and its weight, 0 to 1, that an expression of a VRM binds. */

@@ -9,9 +9,7 @@ use cagework_core::deform::displacements;
 use cagework_core::field::{CELLS, FieldWeights};
 use cagework_core::progress::Progress;
 use cagework_core::{BindOptions, Binding, Controls, bind};
-use cagework_io::{
-    CompactOptions, Feet, Interpolation, Model, ModelFormat, ReshapeOptions, Skeleton, Timeline, compact,
-};
+use cagework_io::{Feet, Interpolation, Model, ModelFormat, ReshapeOptions, Skeleton, Timeline};
 use glam::{DVec3, Vec3};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -35,13 +33,12 @@ struct Request {
     mask: Vec<(String, f32)>,
     skeleton: Option<Source>,
     is_static: bool,
-    size: CompactOptions,
     origin: DVec3,
 }
 
 /// Deforms a model with its rig: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, ground=False, feet="free", rigid=(), mask=None, skeleton=None, expressions=False, times=None,
-/// interpolation="linear", static=False, quantize=False, compress="none", **options) -> bytes
+/// interpolation="linear", static=False, **options) -> bytes
 ///
 /// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object
 /// units; options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and
@@ -56,7 +53,7 @@ struct Request {
 /// planted feet in place in clips; rigid: names of parts (materials, nodes, joints, groups) whose connected pieces keep
 /// their shape; mask: dict from the name of a part to how much of it stays in place, 0 to 1; skeleton: path or bytes of
 /// the body whose joints determine those with the same names, for clothes and for files of clips without a mesh; static:
-/// write the mesh only, without its rig; quantize, compress ("meshopt"): write a small GLB, as the command does.
+/// write the mesh only, without its rig.
 ///
 /// Raises OSError, ModelError, BindError, OptionError, ArrayError. Ctrl-C cancels.
 ///
@@ -65,7 +62,7 @@ struct Request {
 /// >>> data[:4]
 /// b'glTF'
 #[pyfunction]
-#[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, ground = false, feet = "free", rigid = Vec::new(), mask = None, skeleton = None, expressions = false, times = None, interpolation = "linear", r#static = false, quantize = false, compress = "none", **options))]
+#[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, ground = false, feet = "free", rigid = Vec::new(), mask = None, skeleton = None, expressions = false, times = None, interpolation = "linear", r#static = false, **options))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn reshape<'py>(
     py: Python<'py>,
@@ -83,8 +80,6 @@ pub(crate) fn reshape<'py>(
     times: Option<&Bound<'py, PyAny>>,
     interpolation: &str,
     r#static: bool,
-    quantize: bool,
-    compress: &str,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let mask: Vec<(String, f32)> = mask.into_iter().flatten().collect();
@@ -129,13 +124,10 @@ pub(crate) fn reshape<'py>(
         mask,
         skeleton: skeleton.map(|body| Source::of("skeleton", body)).transpose()?,
         is_static: r#static,
-        size: CompactOptions { quantize, compress: word("compress", compress)? },
         origin,
     };
-    let bytes = work::run(py, move |progress| {
-        let bytes = request.reshaped(&source, controls, &poses, options, progress)?;
-        compact(bytes, request.size).map_err(error::model)
-    })??;
+    let bytes =
+        work::run(py, move |progress| request.reshaped(&source, controls, &poses, options, progress))??;
     Ok(PyBytes::new(py, &bytes))
 }
 
@@ -194,7 +186,6 @@ impl Request {
         let mut model = source.read_for(of_rig.skeleton.is_some(), options.memory_limit)?;
         model.set_origin(self.origin);
         let format = if matches!(poses, Poses::Targets(_)) { ModelFormat::Gltf } else { model.format() };
-        self.size.require(format).map_err(error::option)?;
         if of_rig.expressions && model.vrm().is_none() {
             return Err(error::option(format!("expressions need a VRM, but {} has no VRM data", model.name)));
         }

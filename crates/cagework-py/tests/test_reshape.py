@@ -25,7 +25,7 @@ def rigged(tmp_path_factory):
         ({"joints": "turn"}, "--joints turn"),
         ({"joints": "stay", "keep_travel": True}, "--joints stay --keep-travel"),
         ({"mask": {"skin": 0.5}, "rigid": ["arm"]}, "--mask skin=0.5 --rigid arm"),
-        ({"ground": True, "quantize": True, "compress": "meshopt"}, "--ground --quantize --compress meshopt"),
+        ({"ground": True}, "--ground"),
         ({"feet": "lock"}, "--feet lock"),
     ],
 )
@@ -185,7 +185,6 @@ def test_one_cage_encloses_several_models(rigged):
         ("dict", {"skeleton": rigged_glb()}, "skeleton needs one pose"),
         ("array", {"expressions": True}, "need a dict of poses"),
         ("array", {"feet": "glue"}, "feet: .*free, lock"),
-        ("array", {"compress": "zip"}, "compress: .*none, meshopt"),
         ("array", {"static": True, "feet": "lock"}, "needs a model with a skeleton"),
     ],
 )

@@ -5,7 +5,7 @@ use cagework_core::field::{CELLS, FieldWeights, Lattice};
 use cagework_core::options::OutsidePolicy;
 use cagework_core::{Binding, Controls, Frames, Weights};
 use cagework_editor::{PageBindOptions, RigOptions};
-use cagework_io::{Model, ModelFormat, ReshapeOptions, compact};
+use cagework_io::{Model, ModelFormat, ReshapeOptions};
 use cagework_pose::Parts;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
@@ -76,7 +76,6 @@ impl Binder {
         let posed = pose(&posed, rest.len())?;
         let keeps_rig = model.is_rigged() && !rig.plain;
         let of_rig = of_model(model, &rig)?;
-        rig.size.require(model.format()).map_err(|e| Fault::new(ErrorName::Error, e))?;
         let extra = if keeps_rig { model.extra_points()? } else { Vec::new() };
         let at = [model.positions.as_slice(), &extra].concat();
         let mut request: PageBindOptions = decode(options)?;
@@ -90,19 +89,16 @@ impl Binder {
             let Binding { weights, frames, .. } =
                 self.run(&lattice.points(), &set, request, progress).await?;
             let field = FieldWeights::new(lattice, weights, frames).pose(&rest, &posed);
-            let written = model.write_in_field(model.format(), &field)?;
-            return Ok(compact(written, rig.size)?);
+            return Ok(model.write_in_field(model.format(), &field)?);
         }
         let bound = self.run(&at, &set, request, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
             let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
-            let written = model.write_reshaped(&by, &outside, &[], &of_rig)?;
-            return Ok(compact(written.0, rig.size)?);
+            return Ok(model.write_reshaped(&by, &outside, &[], &of_rig)?.0);
         }
         let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig);
-        let written = model.write(model.format(), &deformed)?;
-        Ok(compact(written, rig.size)?)
+        Ok(model.write(model.format(), &deformed)?)
     }
 }
 

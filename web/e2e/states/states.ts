@@ -322,8 +322,6 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { cage: CAGE_WITH_CONTROLS },
     { model: TWO_MODELS, poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }] },
     { rigOptions: { ...INITIAL_STATE.rigOptions, dynamic: true } },
-    { model: RIG, rigOptions: { ...INITIAL_STATE.rigOptions, quantize: true } },
-    { model: RIG, rigOptions: { ...INITIAL_STATE.rigOptions, quantize: true, compress: "meshopt" } },
   ],
 });
 

@@ -154,7 +154,6 @@ for (const [options, line] of [
   [{}, ""],
   [{ joints: "turn", keep_travel: true }, " --joints turn --keep-travel"],
   [{ ground: true, feet: "lock" }, " --ground --feet lock"],
-  [{ quantize: true, compress: "meshopt" }, " --quantize --compress meshopt"],
   [{ plain: true }, " --static"],
 ]) {
   test(`a reshaped rigged file equals the command's, byte for byte${line}`, async () => {

@@ -2,7 +2,7 @@
 
 import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
-import type { ModelInfo, RigOptions } from "../contract";
+import type { ModelInfo } from "../contract";
 import { fittingPoses, isCapture, rigOf, shapeFormatOf, shapeFormatsOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
@@ -79,7 +79,6 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
       </button>
       {kind === "picture" && <PictureOptions app={app} />}
       {kind === "glb" && <RigExport app={app} />}
-      {kind === "glb" && !isCapture(state.model) && <FileSize app={app} />}
       {kind === "poses" && state.model?.vrm && (
         <div class="export-option">
           <Toggle
@@ -125,33 +124,6 @@ function RigExport({ app }: { app: App }) {
         {...switchOf(fieldsOf(rigOptions, app.clips.rig)("plain"), false, true)}
       />
       {!rigOptions.plain && <RigChoices app={app} />}
-    </div>
-  );
-}
-
-const FILE_SIZES = {
-  plain: { quantize: false, compress: "none" },
-  small: { quantize: true, compress: "none" },
-  smallest: { quantize: true, compress: "meshopt" },
-} as const satisfies Record<string, Partial<RigOptions>>;
-
-type FileSizeName = keyof typeof FILE_SIZES;
-
-/** Options that reduce the size of exported GLBs. */
-function FileSize({ app }: { app: App }) {
-  const { quantize, compress } = app.store.get().rigOptions;
-  const value: FileSizeName = compress === "meshopt" ? "smallest" : quantize ? "small" : "plain";
-  const [, sentence] = T.exports.fileSizes[value];
-  return (
-    <div class="export-option stack tight">
-      <Segments
-        label={T.exports.fileSize}
-        values={Object.keys(FILE_SIZES) as FileSizeName[]}
-        labels={(name) => T.exports.fileSizes[name][0] ?? name}
-        value={value}
-        onChange={(value) => app.clips.rig(FILE_SIZES[value])}
-      />
-      {sentence && <p class="hint">{sentence}</p>}
     </div>
   );
 }

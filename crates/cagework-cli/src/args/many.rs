@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use cagework_core::options::{self, parse_grid};
 use clap::Args;
 
-use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs};
+use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs};
 
 /// Arguments of `cagework refit`.
 #[derive(Args, Debug)]
@@ -52,8 +52,6 @@ pub(crate) struct RefitArgs {
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
-    #[command(flatten)]
-    pub(crate) size: SizeArgs,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
     #[command(flatten)]

@@ -19,7 +19,7 @@ use cagework_io::{
 };
 use glam::{DVec3, Vec3};
 
-use crate::args::{ModelOutput, RefitArgs, SizeArgs};
+use crate::args::{ModelOutput, RefitArgs};
 use crate::bind::{bind_positions, check_memory};
 use crate::controls::with_inner;
 use crate::deform::{Deformation, Poses, pose_name};
@@ -141,7 +141,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
                 Some(Ok(deformed)) => {
                     let is_large = deformed.bytes() > args.read.memory.bytes() / PARALLEL_MEMORY_DIVISOR;
                     let names = &poses.names;
-                    writing = Some((job, scope.spawn(move || deformed.write(names, args.size))));
+                    writing = Some((job, scope.spawn(move || deformed.write(names))));
                     if is_large {
                         settle_one(&mut writing, &mut settle)?;
                     }
@@ -214,7 +214,6 @@ fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
                 hint: "rename one of them, or run the command once for each, with different -o",
             });
         }
-        args.size.check(&output)?;
         jobs.push(Job { model: model.clone(), output });
     }
     Ok(jobs)
@@ -402,11 +401,11 @@ impl DeformedModel<'_> {
         self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
     }
 
-    fn write(self, names: &[String], size: SizeArgs) -> Outcome {
+    fn write(self, names: &[String]) -> Outcome {
         let Self { job, model, deformation, options, mut report, started } = self;
         let encoded = deformation.into_file(&model, names, &job.output, &options).and_then(|(bytes, rig)| {
             report.notices.extend(model.copies_in(job.output.format, &bytes));
-            write(&job.output.path, &size.apply(bytes, &job.output.path)?)?;
+            write(&job.output.path, &bytes)?;
             Ok(rig)
         });
         match encoded {

@@ -349,25 +349,6 @@ fn springs_and_colliders_of_a_vrm_are_counted() {
 }
 
 #[test]
-fn written_glb_can_be_quantised_and_compressed() {
-    let sandbox = bound();
-    let posed = format!("{DEFORM} --pose wide.obj");
-    sandbox.run(&format!("{posed} -o plain.glb")).success();
-    sandbox.run(&format!("{posed} --quantize --compress meshopt -o small.vrm")).success();
-    let [plain, small] = ["plain.glb", "small.vrm"].map(|name| sandbox.read(name));
-    assert!(small.len() < plain.len() / 2, "{} and {} bytes", small.len(), plain.len());
-    let refit =
-        "refit humanoid.glb --cage cage.obj --pose wide.obj -g 24 -o out --quantize --compress meshopt";
-    sandbox.run(refit).success();
-    assert!(sandbox.read("out/humanoid.glb") == small);
-    sandbox
-        .run(&format!("{posed} --compress meshopt -o out.obj"))
-        .code(1)
-        .stderr(contains("out.obj: quantize and compress are for .glb and .vrm, but this is obj"));
-    sandbox.run(&format!("{posed} --compress zip -o out.glb")).code(2).stderr(contains("none, meshopt"));
-}
-
-#[test]
 fn ground_and_feet_are_options_of_one_pose() {
     let sandbox = bound();
     // Lower the cage, and with it the model, by half a unit.

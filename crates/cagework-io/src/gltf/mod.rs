@@ -10,8 +10,6 @@ mod accessor;
 mod animate;
 mod build;
 mod channels;
-#[cfg(feature = "compress")]
-mod compact;
 mod container;
 #[cfg(feature = "decompress")]
 mod decompress;
@@ -50,8 +48,6 @@ pub(crate) use accessor::MAX_ELEMENTS;
 pub(crate) use animate::{Pose, PoseClip};
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
-#[cfg(feature = "compress")]
-pub use compact::{CompactOptions, Compression, compact};
 pub(crate) use container::{glb_of, glb_parts, named_files};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;

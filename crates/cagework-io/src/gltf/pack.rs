@@ -87,22 +87,6 @@ impl<'a> Pack<'a> {
         push(json, "bufferViews", view)
     }
 
-    /// Replaces the bytes of a buffer view.
-    #[cfg(feature = "compress")]
-    pub(super) fn replace_view(
-        &mut self,
-        json: &mut Value,
-        view: usize,
-        bytes: Vec<u8>,
-        target: Option<u32>,
-    ) {
-        json["bufferViews"][view] = json!({ "buffer": 0, "byteLength": bytes.len() });
-        if let Some(target) = target {
-            json["bufferViews"][view]["target"] = target.into();
-        }
-        self.views[view] = Some((bytes.into(), 0));
-    }
-
     /// Adds an f32 accessor with `components` numbers per element; `bounds` adds min and max.
     pub(crate) fn push_floats(
         &mut self,

@@ -6,8 +6,6 @@ use thiserror::Error;
 use super::read::Source;
 use super::{Model, ReadError};
 use crate::error::WriteError;
-#[cfg(feature = "compress")]
-use crate::gltf::CompactOptions;
 use crate::polygons::Shape;
 use crate::shown::{shown, without_byte_order_mark};
 use crate::siblings::Resolve;
@@ -375,21 +373,6 @@ impl ModelFormat {
 
 fn extension(name: &str) -> String {
     name.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_ascii_lowercase())
-}
-
-#[cfg(feature = "compress")]
-impl CompactOptions {
-    /// Checks that all options have their defaults unless the format is glTF.
-    ///
-    /// # Errors
-    /// A message for the user.
-    pub fn require(self, format: ModelFormat) -> Result<(), String> {
-        if self == Self::default() || format == ModelFormat::Gltf {
-            return Ok(());
-        }
-        let name = format.name();
-        Err(format!("quantize and compress are for .glb and .vrm, but this is {name}: leave them out"))
-    }
 }
 
 #[cfg(test)]

@@ -161,8 +161,6 @@ def reshape(
     times: Sequence[float] | None = None,
     interpolation: Literal["step", "linear", "cubic"] = "linear",
     static: bool = False,
-    quantize: bool = False,
-    compress: Literal["none", "meshopt"] = "none",
     **options: Unpack[BindOptions],
 ) -> bytes: ...
 def transfer(

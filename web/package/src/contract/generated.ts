@@ -559,10 +559,6 @@ id: number,
  */
 amounts: Array<number>, };
 /**
- * Compression of a GLB.
- */
-export type Compression = "none" | "meshopt";
-/**
  * Kind of coordinates.
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
@@ -1122,15 +1118,7 @@ feet: Feet,
 /**
  * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
  */
-expressions: boolean,
-/**
- * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
- */
-quantize: boolean,
-/**
- * Compression of the buffers.
- */
-compress: Compression, };
+expressions: boolean, };
 /**
  * Place of a cage vertex in a ring.
  */
@@ -1463,7 +1451,7 @@ max_sum_error: number,
 nonzeros: number, };
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"plain":false,"dynamic":false};
 export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];

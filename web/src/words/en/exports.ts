@@ -35,18 +35,6 @@ export const exports = {
   format: "Format of the shape",
   size: "Size of the picture",
   sizes: { 1: "As shown", 2: "Twice", 4: "Four times" },
-  fileSize: "Size of the GLB",
-  fileSizes: {
-    plain: ["Plain", ""],
-    small: [
-      "Smaller",
-      "Normals, texture coordinates and weights as integers. Opens in Blender, Unity and three.js.",
-    ],
-    smallest: [
-      "Smallest",
-      "Also rounds positions to 16 bits and compresses with meshopt, for three.js and Babylon.js. Blender cannot open it.",
-    ],
-  },
   expressions: "Expressions of the VRM",
   expressionsSentence: "Each pose becomes an expression of the same name. No animation is written.",
   alone: "Model only",
