@@ -8,16 +8,12 @@ use serde_json::{Value, json};
 use super::overlap::{ViewOffset, overlapping};
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
-use crate::gltf::pack::{self, F32, Pack, U32, VERTICES, each_accessor, push, write_glb};
+use crate::gltf::pack::{self, F32, Pack, VERTICES, each_accessor, push, write_glb};
 use crate::gltf::patch::embed_images_by;
 use crate::gltf::scene::Instance;
 
 /// Alignment of accessors, bytes.
 const ALIGN: usize = 4;
-
-/// Limit on the elements of a written sparse accessor. Readers, including this crate's, limit the zeros that a file
-/// implies.
-const MAX_SPARSE_COUNT: usize = 1 << 20;
 
 pub(super) struct Edit<'a> {
     document: &'a GltfDocument,
@@ -99,38 +95,6 @@ impl<'a> Edit<'a> {
             [of_accessor["min"], of_accessor["max"]] = pack::bounds(values);
         }
         accessor
-    }
-
-    /// Writes the deltas of a morph target: in place if possible, otherwise into a new accessor. The new accessor is
-    /// sparse if that takes at most half the bytes of a dense one or, if the old accessor was sparse, at most as many
-    /// bytes as a dense one. Returns the accessor's index.
-    pub(super) fn write_deltas(&mut self, accessor: Option<usize>, values: &[[f32; 3]]) -> usize {
-        let moved: Vec<u32> = (0..).zip(values).filter(|(_, v)| **v != [0.0; 3]).map(|(k, _)| k).collect();
-        // In a sparse accessor, a value and its index take 16 bytes; in a dense one, a value takes 12.
-        let was_sparse = accessor.is_some_and(|a| self.json["accessors"][a].get("sparse").is_some());
-        let limit = 12 * values.len() / if was_sparse { 1 } else { 2 };
-        let is_sparse = 16 * moved.len() <= limit && values.len() <= MAX_SPARSE_COUNT;
-        if !is_sparse || accessor.is_some_and(|accessor| self.is_plain(accessor, values.len())) {
-            return self.write(accessor, values, true, true);
-        }
-        self.has_written = true;
-        // glTF does not allow a sparse accessor without values.
-        let moved = if moved.is_empty() { vec![0] } else { moved };
-        let indices: Vec<u8> = moved.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let of_moved: Vec<u8> =
-            moved.iter().flat_map(|&v| values[v as usize]).flat_map(f32::to_le_bytes).collect();
-        let [indices, of_moved] =
-            [indices, of_moved].map(|bytes| Self::push_view(&mut self.bin, &mut self.json, &bytes));
-        let [min, max] = pack::bounds(values);
-        let sparse = json!({
-            "count": moved.len(),
-            "indices": { "bufferView": indices, "componentType": U32 },
-            "values": { "bufferView": of_moved },
-        });
-        let of_accessor = json!({
-            "componentType": F32, "count": values.len(), "type": "VEC3", "min": min, "max": max, "sparse": sparse,
-        });
-        push(&mut self.json, "accessors", of_accessor)
     }
 
     /// Whether an accessor can be overwritten with `count` f32 vectors.

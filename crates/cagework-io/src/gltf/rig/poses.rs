@@ -48,7 +48,7 @@ pub(super) fn append<'p>(
         let mesh = edit.mesh_of(&part.instance);
         let number = part.primitive as usize;
         for _ in part.targets.len()..meshes[&mesh] {
-            let nothing = edit.write_deltas(None, &vec![[0.0; 3]; part.local.len()]);
+            let nothing = edit.write(None, &vec![[0.0; 3]; part.local.len()], true, true);
             push(
                 &mut edit.json["meshes"][mesh]["primitives"][number],
                 "targets",
@@ -105,7 +105,7 @@ fn append_target(
         if positions.iter().flatten().any(|&x| x != 0.0) {
             moved.insert(mesh);
         }
-        let mut target = json!({ "POSITION": edit.write_deltas(None, &positions) });
+        let mut target = json!({ "POSITION": edit.write(None, &positions, true, true) });
         let before = rig.normals(part)?;
         if let (Some(shape), Some(before)) = (shape.and_then(|shape| shape.normals), before) {
             let deltas: Vec<[f32; 3]> = shape
@@ -113,7 +113,7 @@ fn append_target(
                 .zip(before)
                 .map(|(a, b): (&DVec3, DVec3)| (*a - b).as_vec3().to_array())
                 .collect();
-            target["NORMAL"] = edit.write_deltas(None, &deltas).into();
+            target["NORMAL"] = edit.write(None, &deltas, true, true).into();
         }
         push(&mut edit.json["meshes"][mesh]["primitives"][number], "targets", target);
     }

@@ -398,12 +398,14 @@ fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &RigPrimitive, shape: &S
     for (k, (deltas, target)) in shape.targets.iter().zip(before.targets.iter().flatten()).enumerate() {
         if target.positions.is_some() && !part.targets[k].moved.is_empty() {
             put(&format!("targets/{k}/POSITION"), &mut |edit, a| {
-                edit.write_deltas(a, &narrow(&deltas.positions))
+                edit.write(a, &narrow(&deltas.positions), true, true)
             });
         }
         for (what, values) in [("NORMAL", &deltas.normals), ("TANGENT", &deltas.tangents)] {
             if let Some(values) = values {
-                put(&format!("targets/{k}/{what}"), &mut |edit, a| edit.write_deltas(a, &narrow(values)));
+                put(&format!("targets/{k}/{what}"), &mut |edit, a| {
+                    edit.write(a, &narrow(values), true, true)
+                });
             }
         }
     }
