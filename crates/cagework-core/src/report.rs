@@ -1,11 +1,11 @@
 //! Report of a bind, shared by the command line, JSON and the page.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::options::{Backend, Method, Solver};
 
 /// Options, grid, convergence, times and errors of a bind.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindReport {
     /// Discretisation of the cage: classic (K. Smith; `docs/method.md`, sources) or embedded.
@@ -15,7 +15,7 @@ pub struct BindReport {
     /// Processor that computed the bind.
     pub backend: Backend,
     /// Name of the GPU, if it computed the solution.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "typescript", ts(optional))]
     pub adapter: Option<String>,
     /// Number of threads of the solver.
@@ -23,7 +23,7 @@ pub struct BindReport {
     /// Number of cells along the longest side, as requested or chosen.
     pub grid: u32,
     /// Explanation of a number that was chosen automatically.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "typescript", ts(optional))]
     pub grid_reason: Option<String>,
     /// Cells of the grid along x, y, z.
@@ -46,7 +46,6 @@ pub struct BindReport {
     /// solvers: estimated remaining error, RMS over cells. `[iterations / delta_interval]`, rounded up.
     pub delta_history: Vec<f32>,
     /// Iterations per entry of `delta_history`: 1 except for Jacobi on the GPU.
-    #[serde(default = "one")]
     pub delta_interval: u32,
     /// RMS residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
     pub residual_history: Vec<f32>,
@@ -58,7 +57,6 @@ pub struct BindReport {
     pub rest_error: RestError,
     /// Error of the rows of weights before they are corrected. With the embedded method, it is the error of the solver
     /// alone. `None` if all rows have offsets, as around inner points and bones: their weights do not reproduce positions.
-    #[serde(default)]
     pub raw_error: Option<RawError>,
     /// Range, largest sum error, and number of the stored weights.
     pub weights: WeightStats,
@@ -67,21 +65,16 @@ pub struct BindReport {
     /// Number of cage vertices (the first columns).
     pub cage_vertices: u64,
     /// Number of inner controls (the next columns).
-    #[serde(default)]
     pub inner_controls: u64,
     /// Subdivision steps of the smooth surface.
-    #[serde(default)]
     pub smooth: u32,
     /// Number of mesh vertices outside the cage.
     pub outside_vertices: u64,
     /// Number of mesh vertices outside the cage that stay in place.
-    #[serde(default)]
     pub staying_vertices: u64,
     /// Largest distance between the cage and a mesh vertex outside it, object units.
-    #[serde(default)]
     pub outside_distance: f32,
     /// Number of mesh vertices inside the balls and tubes around inner points and bones.
-    #[serde(default)]
     pub held_vertices: u64,
     /// Number of cells for which lines along x, y and z disagree about inside and outside the cage.
     pub ambiguous_cells: u64,
@@ -89,12 +82,8 @@ pub struct BindReport {
     pub notices: Vec<String>,
 }
 
-fn one() -> u32 {
-    1
-}
-
 /// Numbers of cells by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CellCounts {
     /// Cells inside the cage, without the boundary cells.
@@ -107,7 +96,7 @@ pub struct CellCounts {
 }
 
 /// Wall-clock time of each stage of a bind, milliseconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Timings {
     /// Voxelization, levels and transfer tables.
@@ -121,7 +110,7 @@ pub struct Timings {
 }
 
 /// Working memory of a bind, bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemoryBytes {
     /// Estimate that is compared with the memory limit before the bind starts.
@@ -132,7 +121,7 @@ pub struct MemoryBytes {
 
 /// Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
 /// K. Smith's paper (`docs/method.md`, sources).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RestError {
     /// Mean over the vertices, object units.
@@ -149,7 +138,7 @@ pub struct RestError {
 
 /// Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
 /// exactly, so with the embedded method this error is that of the solver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RawError {
     /// Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
@@ -161,7 +150,7 @@ pub struct RawError {
 }
 
 /// Mean and maximum of an error over the mesh vertices inside the cage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MeanMax {
     /// Mean of the error.
@@ -171,7 +160,7 @@ pub struct MeanMax {
 }
 
 /// Statistics of the stored weights.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct WeightStats {
     /// Smallest weight.

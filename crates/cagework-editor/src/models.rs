@@ -46,7 +46,6 @@ impl Default for PartOptions {
 
 /// Settings of a model in a project.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
 pub struct MemberSettings {
     /// Number by which surface points refer to the model's first triangle.
     first_triangle: u32,

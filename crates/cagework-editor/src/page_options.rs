@@ -132,10 +132,10 @@ impl Settings {
                 (_, Ok(read)) => match check(&read) {
                     Err(wrong) => format!("; it must be {}", wrong.allowed),
                     Ok(()) => {
-                        // `key` may be a former name of the option, so take all options of `read` that differ from
-                        // their defaults.
-                        let read = fields(&read).into_iter();
-                        taken.extend(read.filter(|(name, value)| defaults.get(name) != Some(value)));
+                        if let (Some(place), Some(value)) = (taken.get_mut(&key), fields(&read).remove(&key))
+                        {
+                            *place = value;
+                        }
                         continue;
                     }
                 },
@@ -155,7 +155,6 @@ fn shown(value: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use cagework_cage::generate::Symmetry;
     use serde_json::json;
 
     use super::*;
@@ -187,21 +186,6 @@ mod tests {
         assert_eq!(settings.notices, Vec::<String>::new());
         saved["notices"] = json!([]);
         assert_eq!(serde_json::to_value(settings).unwrap(), saved);
-    }
-
-    /// Projects before version 0.1.0 name some options of a cage differently.
-    #[test]
-    fn former_names_of_options_are_read() {
-        let former = json!({ "vertices": 120, "margin": 0.1, "symmetry": "on", "voxels": 0 });
-        let settings = read(&json!({ "cage": former }));
-        assert_eq!(settings.notices, Vec::<String>::new());
-        let expected =
-            CageOptions { target: 120, clearance: 0.1, symmetry: Symmetry::X, ..CageOptions::default() };
-        assert_eq!(settings.cage.unwrap(), fields(&expected));
-        let invalid = read(&json!({ "cage": { "vertices": 5 } }));
-        assert_eq!(invalid.cage.unwrap(), fields(&CageOptions::default()));
-        let notice = "In this project vertices is 5; it must be a whole number from 8 to 400: the default is used instead.";
-        assert_eq!(invalid.notices, [notice]);
     }
 
     #[test]

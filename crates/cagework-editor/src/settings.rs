@@ -5,7 +5,7 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
-use cagework_io::{Interpolation, MAX_SECONDS, SECONDS_PER_POSE, decode_pose, position_bytes, positions_of};
+use cagework_io::{Interpolation, MAX_SECONDS, SECONDS_PER_POSE, position_bytes, positions_of};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -25,8 +25,8 @@ pub struct DocumentSettings {
     /// Subdivision and inner controls. The last positions of the project's cage mesh are those of the controls.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controls: Option<CageControls>,
-    /// The pose in the axes of the model's file: [`cagework_io::position_bytes`] in URL-safe base 64. In older projects
-    /// [`cagework_io::encode_pose`]. Null at rest.
+    /// The pose in the axes of the model's file: [`cagework_io::position_bytes`] in URL-safe base 64. Null
+    /// at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
     /// Pinned surface points, which stay in place when the user pulls others.
@@ -166,9 +166,8 @@ impl DocumentSettings {
         let damaged = "The pose in this project is damaged: the cage is at rest.";
         let bytes = URL_SAFE_NO_PAD.decode(text.trim_end_matches('=')).map_err(|_| damaged)?;
         let up = document.models.up();
-        let rest = up.turned_back(&document.cage.mesh.positions);
-        let exact = positions_of(&bytes).filter(|pose| pose.len() == rest.len());
-        let pose = exact.map_or_else(|| decode_pose(&rest, &bytes), Ok).map_err(|_| damaged)?;
+        let n_controls = document.cage.mesh.positions.len();
+        let pose = positions_of(&bytes).filter(|pose| pose.len() == n_controls).ok_or(damaged)?;
         Ok(Some(up.turned(&pose).into_owned()))
     }
 }
@@ -195,16 +194,6 @@ mod tests {
         let mesh = PolygonMesh { positions: vec![Vec3::ONE], faces: Vec::new() };
         let cage = Arc::new(RestCage { mesh, ..RestCage::default() });
         Document { cage, ..Document::default() }
-    }
-
-    /// The bytes are a count, the largest offset 2, and the offsets 2, 1 and -2 in units of 2 / 32,767.
-    #[test]
-    fn poses_of_older_projects_are_read() {
-        let bytes = [1, 0, 0, 0, 0, 0, 0, 0x40, 0xff, 0x7f, 0, 0x40, 1, 0x80];
-        let old =
-            DocumentSettings { pose: Some(URL_SAFE_NO_PAD.encode(bytes)), ..DocumentSettings::default() };
-        let pose = old.pose_of(&one_vertex()).unwrap().unwrap();
-        assert!(pose[0].distance(Vec3::new(3.0, 2.0, -1.0)) < 2.0 / 32_767.0, "{pose:?}");
     }
 
     #[test]

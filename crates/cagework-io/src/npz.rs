@@ -41,9 +41,6 @@ pub enum NpzError {
         "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
     )]
     Missing(&'static str),
-    /// The file has offsets in the obsolete layout with `outside_corners`.
-    #[error("the file was written by an earlier version with another layout of offsets: bind again")]
-    Old,
     /// An array has a wrong type, shape or value.
     #[error("array '{array}': {problem}")]
     Array {
@@ -240,9 +237,6 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights,
             problem: format!("has {} values, not 2", shape.len()),
         });
     };
-    if zip.has("outside_corners") {
-        return Err(NpzError::Old);
-    }
     let own = read_rows(&mut zip, ["indptr", "indices", "data"], (rows, columns))?;
     let frames = read_frames(&mut zip, columns)?;
     let weights = if frames.is_used() {

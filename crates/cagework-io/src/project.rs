@@ -21,11 +21,8 @@ use crate::origin::translation;
 use crate::shown::shown;
 use crate::splats::SplatsToWrite;
 
-/// Format version of projects with one model near the origin, with several models, and with models far from the origin.
-/// Readers that know only the first version reject the other two.
-const VERSION: u64 = 1;
-const VERSION_MULTIPLE_MODELS: u64 = 2;
-const VERSION_FAR_ORIGIN: u64 = 3;
+/// Format version of projects.
+const VERSION: u64 = 4;
 
 /// Contents of a project.
 #[derive(Clone, Debug)]
@@ -46,9 +43,9 @@ pub enum ProjectError {
     /// The model in the project cannot be read.
     #[error(transparent)]
     Model(#[from] ReadError),
-    /// The project was written by a newer version of the program.
+    /// The project has another format version.
     #[error(
-        "{} is a project of version {found}, but this program reads versions up to {VERSION_FAR_ORIGIN}: update the program",
+        "{} is a project of version {found}, but this program reads version {VERSION}: open it with the program that wrote it",
         shown(name)
     )]
     Version {
@@ -115,13 +112,10 @@ pub fn write_project(
     let up = model.up();
     let cage = &up.mesh_turned_back(cage);
     let node = add_cage(&mut json, &mut pack, cage, model.origin);
-    let version = if more.is_empty() { VERSION } else { VERSION_MULTIPLE_MODELS };
-    let version = if model.origin == DVec3::ZERO { version } else { VERSION_FAR_ORIGIN };
-    let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
-    project["up"] = up.to_string().into();
-    if version == VERSION_FAR_ORIGIN {
-        project["origin"] = json!(model.origin.to_array());
-    }
+    let mut project = json!({
+        "version": VERSION, "name": model.name, "up": up.to_string(), "origin": model.origin.to_array(),
+        "node": node, "settings": settings,
+    });
     if let Some(source) = source {
         project["source"] = view(&mut pack, &mut json, source);
     }
@@ -169,7 +163,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         .map_err(|source| ReadError::Gltf { name: name.into(), source })?;
     let Some(project) = take_project(&mut json) else { return Ok(None) };
     let found = project["version"].as_u64().unwrap_or(0);
-    if !(VERSION..=VERSION_FAR_ORIGIN).contains(&found) {
+    if found != VERSION {
         return Err(ProjectError::Version { name: name.into(), found });
     }
     let views = json["bufferViews"].clone();
@@ -179,12 +173,11 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
     };
     let model_name = project["name"].as_str().unwrap_or(name);
-    // Projects of early versions do not store an up axis.
-    let up = project["up"].as_str().and_then(|up| up.parse().ok()).unwrap_or_default();
-    // Only projects far from the world's origin store their origin.
-    let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
+    let up =
+        project["up"].as_str().and_then(|up| up.parse().ok()).ok_or(damaged("its up axis is unknown"))?;
+    let origin: [f64; 3] = serde_json::from_value(project["origin"].clone())
         .map_err(|_| damaged("its origin is not three numbers"))?;
-    let origin = DVec3::from_array(origin.unwrap_or_default());
+    let origin = DVec3::from_array(origin);
     let place = |model: &mut Model| {
         model.set_origin(origin);
         model.set_up(up);

@@ -76,12 +76,11 @@ pub const BOX_DIVISIONS: u32 = 2;
 pub const BOX_MARGIN: f32 = 0.05;
 
 choice! {
-    /// Kind of a generated cage. Serde aliases are names in older project files.
+    /// Kind of a generated cage.
     CageKind {
         /// Sleeves if they enclose the model and score better than the shell, otherwise the shell
         /// ([`crate::generate_of_kind`]).
         #[default]
-        #[serde(alias = "follow")]
         Auto = "auto",
         /// Sleeves of quads along the limbs of a skeleton ([`crate::sleeves`]).
         Skeleton = "skeleton",
@@ -99,10 +98,8 @@ choice! {
         #[default]
         Auto = "auto",
         /// Not symmetric.
-        #[serde(alias = "off")]
         None = "none",
         /// Symmetric about a plane of constant x.
-        #[serde(alias = "on")]
         X = "x",
         /// Symmetric about a plane of constant y.
         Y = "y",
@@ -129,13 +126,12 @@ impl Mirror {
     }
 }
 
-/// Options of [`super::generate`]. Serde aliases are names in older project files.
+/// Options of [`super::generate`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageOptions {
     /// Target number of vertices, 8 to 400. Default 80.
-    #[serde(alias = "vertices")]
     pub target: u32,
     /// Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
     /// 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
@@ -144,7 +140,6 @@ pub struct CageOptions {
     /// Whether to pair triangles into quads. Default true.
     pub quads: bool,
     /// Kind of cage. Default auto.
-    #[serde(alias = "shape")]
     pub kind: CageKind,
     /// Mirror symmetry. Default auto.
     pub symmetry: Symmetry,
@@ -153,7 +148,6 @@ pub struct CageOptions {
     pub per_component: bool,
     /// Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
     /// of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
-    #[serde(alias = "margin")]
     pub clearance: f32,
     /// Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
     /// voxels are closed, and details thinner than one voxel are lost. Default 0.

@@ -297,11 +297,11 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
  */
 quads: number, bounds: Bounds, notices: Array<string>, };
 /**
- * Kind of a generated cage. Serde aliases are names in older project files.
+ * Kind of a generated cage.
  */
 export type CageKind = "auto" | "skeleton" | "shell" | "hull";
 /**
- * Options of [`super::generate`]. Serde aliases are names in older project files.
+ * Options of [`super::generate`].
  */
 export type CageOptions = {
 /**
