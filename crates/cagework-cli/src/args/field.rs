@@ -10,7 +10,7 @@ use super::{ControlArgs, ReadArgs, number};
 /// Arguments of `cagework map`.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Points are text, one point per line (.csv, .txt, .xyz: x y z first or in columns with these names; other \
+    after_help = "Points are a table with one point per line (.csv: x, y, z first or in columns with these names; other \
     columns are kept), a NumPy array [n, 3] (.npy), or the vertices of a model or point cloud. Points inside the cage move \
     with it; further out they move less and less.\n\n\
     Examples:\n  \

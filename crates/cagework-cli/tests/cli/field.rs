@@ -120,7 +120,7 @@ fn invalid_points_and_outputs_of_map_are_refused() {
         sandbox.run(&format!("map {points} --cage cage.obj --pose posed.obj -o {output}"))
     };
     sandbox.write("words.csv", "a,b,c\nno,numbers,here\n");
-    map("words.csv", "out.csv").code(1).stderr(contains("words.csv: the file has no points"));
+    map("words.csv", "out.csv").code(1).stderr(contains("words.csv: line 1 has neither three numbers"));
     map("probes.csv", "out.obj").code(1).stderr(contains("points keep their format"));
     map("mesh.obj", "out.csv").code(1).stderr(contains("out.csv"));
     map("probes.csv", "probes.csv").code(1).stderr(contains("probes.csv"));
