@@ -99,7 +99,7 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
             (mesh, &model),
             output,
             saved,
-            Poses { names: vec![name_of(args)], rest: rest.to_vec(), positions: vec![pose] },
+            &Poses { names: vec![name_of(args)], rest: rest.to_vec(), positions: vec![pose] },
             &mut summary,
         )?;
     }
@@ -144,13 +144,13 @@ fn deform(
     (mesh, model): (&Path, &Model),
     output: &ModelOutput,
     saved: SavedWeights,
-    poses: Poses,
+    poses: &Poses,
     summary: &mut Summary,
 ) -> Result<(), CliError> {
     args.rig.check_clips(model, mesh, 1)?;
     let (options, of_names) = args.rig.options(model, mesh)?;
     let options = ReshapeOptions { ground: true, ..options };
-    let deformation = Deformation::new(model, saved, &poses, output.format, (&options, args.rig.shape_only));
+    let deformation = Deformation::new(model, saved, poses, output.format, (&options, args.rig.shape_only));
     let (bytes, report) = deformation.into_file(model, &poses.names, output, &options)?;
     summary.notices.extend(of_names);
     summary.notices.extend(report.iter().flat_map(ReshapeReport::notices));
