@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs a linker and the pinned Rust toolchain, then runs `cargo xtask "$@"`.
-# `npm start`, `npm test`, `npm run build` and `npm run check` call this script.
+# `npm start`, `npm test` and the scripts of package.json call this script.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -15,19 +15,22 @@ for row in "${debian_packages[@]}"; do
   command -v "$command" >/dev/null || missing+=($packages)
 done
 # Tests of the page use Debian's Chromium, and Mesa's software OpenGL.
-if [[ " test page-test npm " == *" ${1:-} "* ]]; then
+if [[ " test test-all page-test npm " == *" ${1:-} "* ]]; then
   command -v chromium >/dev/null || missing+=(chromium)
   compgen -G "/usr/lib/*/libEGL_mesa.so.0" >/dev/null || missing+=(libegl1 libgl1-mesa-dri)
 fi
-# Tests of the kernels need a Vulkan device, for example Mesa's software device. Tests in Firefox need a virtual screen.
-if [ "${1:-}" = test ]; then
+# Tests in Firefox need a virtual screen.
+if [ "${1:-}" = test-all ]; then
   command -v firefox-esr >/dev/null || missing+=(firefox-esr)
   command -v Xvfb >/dev/null || missing+=(xvfb)
+fi
+# Tests of the kernels need a Vulkan device, for example Mesa's software device.
+if [[ " test test-all " == *" ${1:-} "* ]]; then
   compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)
   compgen -G "/usr/share/vulkan/icd.d/*.json" >/dev/null || missing+=(mesa-vulkan-drivers)
 fi
 # The Python package is built and tested in a virtual environment.
-if [[ " test python wheel " == *" ${1:-} "* ]]; then
+if [[ " test-all test-long python wheel " == *" ${1:-} "* ]]; then
   python3 -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 fi
 if ((${#missing[@]})); then

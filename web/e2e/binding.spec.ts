@@ -23,9 +23,9 @@ test("frames are drawn during a bind at g = 64", async ({ page }) => {
   expect(frames).toBeGreaterThan(2);
 });
 
-test("binds are compared in the panel, cancelled on both back ends, and rejected after an edit", async ({
-  page,
-}) => {
+test("binds are compared in the panel, cancelled on both back ends, and rejected after an edit", {
+  tag: "@story",
+}, async ({ page }) => {
   await open(page);
   await page.getByRole("button", { name: /bind/i }).first().click();
   const grid = (cells: string) => page.locator("#panel").getByRole("radio", { name: cells, exact: true });

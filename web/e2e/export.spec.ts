@@ -4,7 +4,7 @@ import { validationErrors } from "./models";
 import { exportsAPicture, exportsWhatIsShown } from "./stories";
 import { bound, cagePositions, download, drag, drop, expect, open, test } from "./support";
 
-test("every export is valid and opens again", async ({ page }) => {
+test("every export is valid and opens again", { tag: "@story" }, async ({ page }) => {
   await open(page);
 
   await test.step("poses, cage, weights and picture are valid files", async () => {

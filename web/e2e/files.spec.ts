@@ -18,10 +18,9 @@ import {
   test,
 } from "./support";
 
-test("good files get a cage and can be dragged, bad files leave the model open and report the cause", async ({
-  page,
-  complaints,
-}) => {
+test("good files get a cage and can be dragged, bad files leave the model open and report the cause", {
+  tag: "@story",
+}, async ({ page, complaints }) => {
   await page.setViewportSize({ width: 820, height: 520 });
   const worm = [{ name: "worm.glb", bytes: await glb() }];
   const draco = [{ name: "draco.glb", bytes: await dracoGlb() }];

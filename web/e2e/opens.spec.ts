@@ -4,11 +4,9 @@ import { box } from "./models";
 import { drawsNothing, followsAHandle } from "./stories";
 import { cagePositions, drag, drop, expect, largestMove, open, shoot, test } from "./support";
 
-test("opens below any path with a bound sample, draws nothing when idle, and shares its pose by a link", async ({
-  page,
-  context,
-  complaints,
-}) => {
+test("opens below any path with a bound sample, draws nothing when idle, and shares its pose by a link", {
+  tag: "@story",
+}, async ({ page, context, complaints }) => {
   const foreign: string[] = [];
   page.on("request", (request) => {
     const { hostname, protocol } = new URL(request.url());

@@ -14,7 +14,7 @@ import {
   test,
 } from "./support";
 
-test("points of the model are pulled and pinned", async ({ page }) => {
+test("points of the model are pulled and pinned", { tag: "@story" }, async ({ page }) => {
   await open(page);
   const rest = await cagePositions(page);
   const modelAtRest = await modelPositions(page);

@@ -36,7 +36,9 @@ async function settled(page: Page, count: number): Promise<number[]> {
   return restPositions(page);
 }
 
-test("the cage at rest is edited, checked during the drag and bound again", async ({ page }) => {
+test("the cage at rest is edited, checked during the drag and bound again", { tag: "@story" }, async ({
+  page,
+}) => {
   await page.setViewportSize({ width: 900, height: 560 });
   await openWith(page, [
     { name: "cube.obj", bytes: box(0.9) },

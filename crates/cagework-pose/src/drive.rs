@@ -6,8 +6,7 @@
 use cagework_core::rig::Rig;
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::ends::ENDS;
-use crate::humanoid::{Bone, Humanoid, N_BONES};
+use crate::humanoid::{Bone, ENDS, Humanoid, N_BONES};
 
 /// Number of vertices of the model from which a cage vertex takes its weights.
 const NEAREST: usize = 16;

@@ -4,22 +4,13 @@
 //! of all poses near the given one, the one is taken that brings the vertices of hands, feet and head closest to their
 //! images, by least squares.
 
+use cagework_core::rig::Rig;
 use cagework_core::weights::Weights;
 use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix};
 
 use crate::drive::{Map, skin_of_bones};
-use crate::humanoid::{Bone, Humanoid, N_BONES};
-use cagework_core::rig::Rig;
-
-/// Bones that keep their shape, each with those that move with it.
-pub(crate) const ENDS: [&[Bone]; 5] = [
-    &[Bone::Head],
-    &[Bone::LeftHand],
-    &[Bone::RightHand],
-    &[Bone::LeftFoot, Bone::LeftToes],
-    &[Bone::RightFoot, Bone::RightToes],
-];
+use crate::humanoid::{Bone, ENDS, Humanoid, N_BONES};
 
 /// Vertices of the model with more than this weight for one of [`ENDS`] should keep its shape.
 const OF_END: f64 = 0.95;

@@ -17,17 +17,22 @@ mod wasm;
 
 use std::process::ExitCode;
 
+use tasks::Tier;
+
 const USAGE: &str = "usage: cargo xtask TASK
 
   start [ARGS]   build the page and serve it on this machine (ARGS for `vite preview`: --port 8080, --open)
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
-  test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser, packages
+  test           what a change needs: the Rust and TypeScript tests, and one story per step of the page in Chromium
+  test-all       also the other tests of the page, Firefox, the packages, the glTF validator, damaged files
+  test-long      the Blender extension, the notebooks, the evaluation, and damaged files for an hour
   check          format, lints, documentation, dependency arrows, import circles, phrases in prose, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   check-and-build  `check` during the build of the tests, with the compiler that `.ci/run` sets
   check-scripts  the part of `check` that is about TypeScript
-  test-beside    the part of `test` that runs beside the Rust tests: TypeScript, Firefox, the packages, the page's build
+  test-beside    the part of `test-all` that runs beside the Rust tests: TypeScript, Firefox, packages, the page's build
+  test-scripts-beside  the same for `test`: TypeScript, the page's build
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python [ARGS]  the Python package only, built with the Rust tests and tested against the command (ARGS for pytest)
   blender        the Blender extension: built, and tested in Blender as a Python package (needs Python 3.11)
@@ -55,11 +60,14 @@ fn main() -> ExitCode {
         ["pictures"] => site::pictures(),
         ["demo", rest @ ..] => tasks::demo(rest),
         ["build"] => tasks::build(),
-        ["test"] => tasks::test(),
+        ["test"] => tasks::test(Tier::Change),
+        ["test-all"] => tasks::test(Tier::All),
+        ["test-long"] => tasks::test_long(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
         ["check-and-build"] => tasks::check_and_build(),
-        ["test-beside"] => tasks::test_beside(),
+        ["test-beside"] => tasks::test_beside(Tier::All),
+        ["test-scripts-beside"] => tasks::test_beside(Tier::Change),
         ["scripts", rest @ ..] => site::test_scripts(rest),
         ["firefox"] => site::build().and_then(|()| site::test_firefox()),
         ["exports"] => tasks::build_tests().and_then(|()| tasks::validate_exports()),

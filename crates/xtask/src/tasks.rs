@@ -26,36 +26,77 @@ pub(crate) fn build() -> Result<(), String> {
 /// other features.
 const TEST_PACKAGES: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
-/// Runs the Rust, Python and TypeScript tests, and the tests of the page in browsers. Prints a table of them.
-pub(crate) fn test() -> Result<(), String> {
+/// How many of the tests run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tier {
+    /// The Rust and TypeScript tests, and one story per step of the page in Chromium: what a change needs.
+    Change,
+    /// Also the other tests of the page, Firefox, the packages, damaged files and exported files.
+    All,
+}
+
+/// Marks the tests of the page that belong to [`Tier::Change`].
+const STORY: &str = "@story";
+
+/// Runs the tests of a tier. Prints a table of them.
+pub(crate) fn test(tier: Tier) -> Result<(), String> {
     let began = Instant::now();
     parts::begin()?;
     npm::install()?;
-    let outcome = test_parts();
+    let outcome = test_parts(tier);
     parts::end(began.elapsed()).and(outcome)
 }
 
-fn test_parts() -> Result<(), String> {
-    if !part("build of the Rust tests", "cargo test --no-run", build_tests)? {
+/// Runs what takes longest: the Blender extension, the notebooks, the evaluation, and an hour of damaged files.
+pub(crate) fn test_long() -> Result<(), String> {
+    let began = Instant::now();
+    parts::begin()?;
+    part("Blender extension", "cargo xtask blender", python::test_blender)?;
+    part("notebooks", "cargo xtask notebooks", python::test_notebooks)?;
+    let evaluation = ["test", "--locked", "--package", "cagework-benches", "--bin", "evaluate"];
+    part("evaluation", &format!("cargo {}", evaluation.join(" ")), || run("cargo", &evaluation, &[]))?;
+    let hour = ["--minutes", "60"];
+    part("damaged files", &format!("cargo xtask fuzz {}", hour.join(" ")), || fuzz(&hour))?;
+    parts::end(began.elapsed())
+}
+
+fn test_parts(tier: Tier) -> Result<(), String> {
+    let (task, build): (_, fn() -> _) = match tier {
+        Tier::Change => ("test-scripts-beside", build_rust_tests),
+        Tier::All => ("test-beside", build_tests),
+    };
+    if !part("build of the Rust tests", "cargo test --no-run", build)? {
         return Ok(());
     }
     // Run two tasks in parallel, because most Rust tests leave one of two cores idle.
-    beside("test-beside", || {
+    beside(task, || {
         let own = ["test", "--locked", "--package", "xtask"];
         part("tasks of the repository", &format!("cargo {}", own.join(" ")), || run("cargo", &own, &[]))?;
         let rust = [&["test", "--locked", "--no-fail-fast"], &TEST_PACKAGES[..]].concat();
         part("Rust", &format!("cargo {}", rust.join(" ")), || run("cargo", &rust, &[]))?;
+        if tier == Tier::Change {
+            return Ok(());
+        }
         // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
         let fixed = ["--minutes", "0.1", "--seed", "1"];
         part("damaged files", &format!("cargo xtask fuzz {}", fixed.join(" ")), || fuzz(&fixed))?;
         part("exported files", "cargo xtask exports", validate_exports).map(drop)
     })?;
-    part("page in Chromium", "cargo xtask page-test --last-failed", || site::test_built_page(&[])).map(drop)
+    let (name, args): (_, &[&str]) = match tier {
+        Tier::Change => ("stories of the page", &["--grep", STORY]),
+        Tier::All => ("page in Chromium", &[]),
+    };
+    part(name, "cargo xtask page-test --last-failed", || site::test_built_page(args)).map(drop)
+}
+
+/// Builds the Rust tests and the programs that they run.
+fn build_rust_tests() -> Result<(), String> {
+    run("cargo", &[&["test", "--locked", "--no-run"], &TEST_PACKAGES[..]].concat(), &[])
 }
 
 /// Builds the Rust tests, what they run, and the native module of the Python package.
 pub(crate) fn build_tests() -> Result<(), String> {
-    run("cargo", &[&["test", "--locked", "--no-run"], &TEST_PACKAGES[..]].concat(), &[])?;
+    build_rust_tests()?;
     // `cargo test` omits the native module, which has no Rust tests. The example needs the features of the tests, which
     // therefore apply to the whole build.
     let native = ["--lib", "--example", "export_samples"];
@@ -74,15 +115,20 @@ pub(crate) fn check_and_build() -> Result<(), String> {
     })
 }
 
-/// Runs the part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
+/// Runs what [`test()`] runs in parallel with the Rust tests, after these have been built.
 ///
 /// # Errors
 /// When the page cannot be built. Failed tests are only noted, see [`part`].
-pub(crate) fn test_beside() -> Result<(), String> {
-    part("Python package", "cargo xtask python --last-failed", || python::test(&[]))?;
+pub(crate) fn test_beside(tier: Tier) -> Result<(), String> {
+    if tier == Tier::All {
+        part("Python package", "cargo xtask python --last-failed", || python::test(&[]))?;
+    }
     part("TypeScript", "cargo xtask scripts", || site::test_scripts(&[]))?;
     if !part("build of the page", "cargo xtask page", site::build)? {
         return Err("there is no page to test".to_owned());
+    }
+    if tier == Tier::Change {
+        return Ok(());
     }
     part("page in Firefox", "cargo xtask firefox", site::test_firefox)?;
     part("npm package", "cargo xtask npm", package::test).map(drop)

@@ -86,6 +86,15 @@ const REQUIRED: [Bone; 14] = [
     Bone::RightFoot,
 ];
 
+/// Bones that keep their shape, each with those that move with it.
+pub(crate) const ENDS: [&[Bone]; 5] = [
+    &[Bone::Head],
+    &[Bone::LeftHand],
+    &[Bone::RightHand],
+    &[Bone::LeftFoot, Bone::LeftToes],
+    &[Bone::RightFoot, Bone::RightToes],
+];
+
 /// Joints of the humanoid bones. `[N_BONES]`, indexed by [`Bone`].
 type Joints = [Option<u32>; N_BONES];
 
