@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use cagework_core::{BindOptions, bind};
 use cagework_pose::humanoid::Bone;
-use cagework_pose::proportions::{HumanoidCage, PRESETS, Proportions};
+use cagework_pose::proportions::{HumanoidCage, Proportions};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -47,7 +47,8 @@ pub(crate) fn proportions<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (options, source) = (bind_options(options)?, Source::of("model", model)?);
-    let (bones, proportions) = (given_bones(bones)?, proportions_of(factors, preset)?);
+    let bones = given_bones(bones)?;
+    let proportions = Proportions::of(preset, &factors.unwrap_or_default()).map_err(error::option)?;
     let cage = cage.get();
     let origin = cage.origin();
     let pose = work::run_with(py, progress, |progress| {
@@ -93,21 +94,4 @@ fn given_bones(bones: Option<BTreeMap<String, String>>) -> PyResult<Vec<(Bone, S
         Ok((bone, joint))
     });
     parsed.collect()
-}
-
-fn proportions_of(factors: Option<BTreeMap<String, f64>>, preset: Option<&str>) -> PyResult<Proportions> {
-    let mut proportions = Proportions::default();
-    if let Some(name) = preset {
-        let names = || PRESETS.map(|preset| preset.name).join(", ");
-        let found = PRESETS.iter().find(|preset| preset.name == name);
-        let none = || error::option(format!("preset: {name:?} is not one of {}", names()));
-        proportions = found.ok_or_else(none)?.proportions().map_err(error::option)?;
-    }
-    // Both sides before a single one.
-    let (sides, both): (Vec<_>, Vec<_>) =
-        factors.into_iter().flatten().partition(|(name, _)| name.contains('_'));
-    for (name, factor) in both.into_iter().chain(sides) {
-        proportions.set(&name, factor).map_err(error::option)?;
-    }
-    Ok(proportions)
 }

@@ -1,5 +1,6 @@
 //! Arguments of `cagework proportions`.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use cagework_core::options::{self, Choice, parse_grid};
@@ -121,17 +122,11 @@ impl Args for FactorArgs {
 impl FromArgMatches for FactorArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let wrong = |text: String| Error::raw(ErrorKind::ValueValidation, format!("{text}\n"));
-        let mut proportions = Proportions::default();
-        let mut set =
-            |name: &str, factor: f64| proportions.set(name, factor).map_err(|e| wrong(e.to_string()));
-        let preset = matches.get_one::<String>(&Self::id("preset"));
-        let preset = PRESETS.iter().find(|known| preset.is_some_and(|name| name == known.name));
-        for (name, factor) in preset.map_or(&[][..], |preset| preset.factors) {
-            set(name, *factor)?;
-        }
+        let preset = matches.get_one::<String>(&Self::id("preset")).map(String::as_str);
+        let mut named = BTreeMap::new();
         for (word, _) in Proportion::ALL {
             if let Some(factor) = matches.get_one::<f64>(&Self::id(word)) {
-                set(word, *factor)?;
+                named.insert((*word).to_owned(), *factor);
             }
         }
         for side in ["left", "right"] {
@@ -141,10 +136,10 @@ impl FromArgMatches for FactorArgs {
                 let (name, factor) = parsed.ok_or_else(|| {
                     wrong(format!("--{side} {text}: expected NAME=FACTOR, such as leg=1.1"))
                 })?;
-                set(&format!("{side}_{name}"), factor)?;
+                named.insert(format!("{side}_{name}"), factor);
             }
         }
-        Ok(Self(proportions))
+        Ok(Self(Proportions::of(preset, &named).map_err(|e| wrong(e.to_string()))?))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

@@ -134,6 +134,14 @@ pub enum ProportionError {
         /// Names of those with two sides.
         sided: String,
     },
+    /// No preset has the name.
+    #[error("there is no preset {name:?}; there are {known}")]
+    Preset {
+        /// The given name, shortened.
+        name: String,
+        /// All names.
+        known: String,
+    },
     /// The factor is out of range.
     #[error("{name}: {error}")]
     Range {
@@ -145,6 +153,31 @@ pub enum ProportionError {
 }
 
 impl Proportions {
+    /// Factors by name; those of a preset, if its name is given, hold where no other factor does.
+    ///
+    /// # Errors
+    /// [`ProportionError`] as for [`Self::set`], or if no preset has the name.
+    pub fn of(preset: Option<&str>, named: &BTreeMap<String, f64>) -> Result<Self, ProportionError> {
+        let mut proportions = Self::default();
+        if let Some(name) = preset {
+            let none = || ProportionError::Preset {
+                name: shortened(name),
+                known: PRESETS.map(|preset| preset.name).join(", "),
+            };
+            let found = PRESETS.iter().find(|preset| preset.name == name).ok_or_else(none)?;
+            for (name, factor) in found.factors {
+                proportions.set(name, *factor)?;
+            }
+        }
+        // Both sides before a single one, so that it may differ.
+        let (sides, both): (Vec<_>, Vec<_>) =
+            named.iter().partition(|(name, _)| name.starts_with("left_") || name.starts_with("right_"));
+        for (name, factor) in both.into_iter().chain(sides) {
+            proportions.set(name, *factor)?;
+        }
+        Ok(proportions)
+    }
+
     /// Sets the factor of a proportion by name, such as "leg" for both sides or "left_leg" for one.
     ///
     /// # Errors
@@ -159,8 +192,11 @@ impl Proportions {
                 let kept = Proportion::ALL.iter().filter(|(_, p)| !only_sided || p.facts().is_sided);
                 kept.map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
             };
-            let name = name.chars().take(40).collect();
-            return Err(ProportionError::Unknown { name, known: words(false), sided: words(true) });
+            return Err(ProportionError::Unknown {
+                name: shortened(name),
+                known: words(false),
+                sided: words(true),
+            });
         };
         let wrong = |error| ProportionError::Range { name: name.to_owned(), error };
         FACTOR.check(factor).map_err(wrong)?;
@@ -200,14 +236,7 @@ impl TryFrom<BTreeMap<String, f64>> for Proportions {
     type Error = ProportionError;
 
     fn try_from(named: BTreeMap<String, f64>) -> Result<Self, ProportionError> {
-        let mut proportions = Self::default();
-        // "leg" before "left_leg", so that one side may differ from both.
-        let (sides, both): (Vec<_>, Vec<_>) =
-            named.iter().partition(|(name, _)| name.starts_with("left_") || name.starts_with("right_"));
-        for (name, factor) in both.into_iter().chain(sides) {
-            proportions.set(name, *factor)?;
-        }
-        Ok(proportions)
+        Self::of(None, &named)
     }
 }
 
@@ -215,6 +244,10 @@ impl From<Proportions> for BTreeMap<String, f64> {
     fn from(proportions: Proportions) -> Self {
         proportions.named()
     }
+}
+
+fn shortened(name: &str) -> String {
+    name.chars().take(40).collect()
 }
 
 /// A named set of proportions.
@@ -280,9 +313,7 @@ impl Preset {
     /// # Errors
     /// [`ProportionError`]; a test sets every preset, so this does not occur.
     pub fn proportions(&self) -> Result<Proportions, ProportionError> {
-        let named: BTreeMap<String, f64> =
-            self.factors.iter().map(|(name, f)| ((*name).to_owned(), *f)).collect();
-        named.try_into()
+        Proportions::of(Some(self.name), &BTreeMap::new())
     }
 }
 
