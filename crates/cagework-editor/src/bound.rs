@@ -265,7 +265,9 @@ pub(crate) mod tests {
         let mut editor = Editor::default();
         editor.open([(Model::read("a.obj", text, &mut |_| None).unwrap(), None)], Contents::default());
         let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [1; 3]);
-        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
         editor
     }
 

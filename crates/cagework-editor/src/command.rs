@@ -5,11 +5,13 @@ use std::sync::Arc;
 use cagework_core::{InnerElement, PolygonMesh};
 use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, TimelineError, check_times};
 use cagework_pose::blend::reblend;
+use cagework_pose::humanoid::Bone;
+use cagework_pose::proportions::Proportions;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::controls::{CageControls, InnerKind, RestCage};
-use crate::document::{NamedPose, Transition};
+use crate::document::{Document, NamedPose, Transition};
 use crate::edit::SelectMode;
 use crate::editor::Editor;
 use crate::error::EditError;
@@ -52,6 +54,28 @@ pub enum Command {
     },
     /// Moves the cage to its rest position.
     ResetPose,
+    /// Sets the factor of a proportion of the humanoid that the models form. Displaces the pose by the difference to the
+    /// previous factor.
+    SetProportion {
+        /// Name of the proportion, such as "leg" for both sides or "left_leg" for one.
+        name: String,
+        /// Factor, 0.5 to 2; 1 keeps the length at rest.
+        factor: f64,
+    },
+    /// Sets the factors of all proportions to those of a preset, or to 1.
+    SetPreset {
+        /// Name of the preset; null sets all factors to 1.
+        name: Option<String>,
+    },
+    /// Gives the right side the factors of the left side.
+    MirrorProportions,
+    /// Names the joint of a humanoid bone.
+    SetBone {
+        /// The bone.
+        bone: Bone,
+        /// Name of the joint; null takes the joint that the file's data, names or shape tell.
+        joint: Option<String>,
+    },
     /// Saves the pose under a name.
     SavePose {
         /// Name of the new saved pose.
@@ -133,6 +157,10 @@ pub enum Command {
         positions: Vec<Vec3>,
         /// Shares of the saved poses in the current pose.
         shares: Vec<f32>,
+        /// Factors of the proportions that the current pose contains.
+        #[serde(default)]
+        #[cfg_attr(feature = "typescript", ts(optional, type = "Readonly<Record<string, number>>"))]
+        proportions: Proportions,
     },
     /// Sets the surface points that pulls keep in place.
     SetPins {
@@ -148,6 +176,10 @@ pub enum Command {
         controls: Option<CageControls>,
         /// Notices of the cage generator about the new cage.
         notices: Vec<String>,
+        /// Loops of vertices around the limbs of a generated cage.
+        #[serde(default)]
+        #[cfg_attr(feature = "typescript", ts(optional, as = "Option<Vec<Vec<u32>>>"))]
+        rings: Vec<Vec<u32>>,
     },
     /// Makes the current positions of the cage its rest position. Saved poses keep their displacements from it.
     MoveRest,
@@ -221,13 +253,21 @@ impl Editor {
     pub fn apply(&mut self, command: Command) -> Result<(), EditError> {
         // Each arm of the match checks its command before it changes anything.
         match command {
-            Command::SetPose { positions } => self.set_pose(positions)?,
+            Command::SetPose { positions } => {
+                self.set_pose(positions)?;
+                self.document_mut().proportions = Proportions::default();
+            }
             Command::ResetPose => self.reset_pose(),
+            Command::SetProportion { name, factor } => self.set_proportion(&name, factor)?,
+            Command::SetPreset { name: Some(name) } => self.set_preset(&name)?,
+            Command::SetPreset { name: None } => self.set_proportions(Proportions::default())?,
+            Command::MirrorProportions => self.mirror_proportions()?,
+            Command::SetBone { bone, joint } => self.set_bone(bone, joint)?,
             Command::SavePose { name } => {
                 let pose = self.document().pose.clone();
                 let pins = Some(self.document().pins.clone());
                 let document = self.document_mut();
-                let cage = Some(document.cage_id);
+                let (cage, proportions) = (Some(document.cage_id), document.proportions);
                 // The pose equals the new saved pose, so the share of the new one is 1 and all other shares are 0.
                 document.shares = std::iter::repeat_n(0.0, document.poses.len()).chain([1.0]).collect();
                 Arc::make_mut(&mut document.poses).push(NamedPose {
@@ -237,12 +277,14 @@ impl Editor {
                     pins,
                     lead: SECONDS_PER_POSE,
                     interpolation: None,
+                    proportions,
                 });
             }
             Command::ApplyPose { index } => {
-                let NamedPose { positions, pins, .. } = self.fitting_pose(index)?.clone();
+                let NamedPose { positions, pins, proportions, .. } = self.fitting_pose(index)?.clone();
                 self.set_pose(positions.to_vec())?;
                 let document = self.document_mut();
+                document.proportions = proportions;
                 document.shares = only(index, document.poses.len());
                 if let Some(pins) = pins {
                     document.pins = pins;
@@ -263,9 +305,10 @@ impl Editor {
                 self.pose(index)?;
                 let document = self.document_mut();
                 let (positions, pins) = (document.pose.clone(), Some(document.pins.clone()));
-                let cage = Some(document.cage_id);
+                let (cage, proportions) = (Some(document.cage_id), document.proportions);
                 let pose = &mut Arc::make_mut(&mut document.poses)[index];
                 (pose.positions, pose.cage, pose.pins) = (positions, cage, pins);
+                pose.proportions = proportions;
                 document.shares = only(index, document.poses.len());
             }
             Command::DuplicatePose { index, name } => {
@@ -298,16 +341,20 @@ impl Editor {
                 self.document_mut().transition = transition.within_limits();
             }
             Command::Blend { index, share } => self.blend(index, share)?,
-            Command::CarryPoses { from, positions, shares } => {
+            Command::CarryPoses { from, positions, shares, proportions } => {
                 self.take_carried(from, &positions, &shares)?;
+                self.document_mut().proportions = proportions;
             }
             Command::SetPins { pins } => self.document_mut().pins = pins.into(),
-            Command::ReplaceCage { mesh, controls, notices } => {
+            Command::ReplaceCage { mesh, controls, notices, rings } => {
                 let mut cage = match controls {
                     Some(controls) => RestCage::new(mesh, controls)?,
                     None => self.document().cage.replaced(&mesh)?,
                 };
                 cage.notices.extend(notices);
+                if !rings.is_empty() {
+                    cage.controls.rings = rings;
+                }
                 self.set_cage(cage);
                 self.document_mut().has_sample_cage = false;
             }
@@ -354,7 +401,7 @@ impl Editor {
                 let mut mesh = cage.mesh.clone();
                 mesh.positions.truncate(cage.n_cage());
                 mesh.positions.extend(&positions);
-                let controls = CageControls { inner: positions.len(), elements, ..cage.controls };
+                let controls = CageControls { inner: positions.len(), elements, ..cage.controls.clone() };
                 let cage = RestCage::new(mesh, controls)?;
                 self.set_cage(cage);
             }
@@ -475,7 +522,9 @@ impl Editor {
         let from = if committed.cage_id == document.cage_id { &committed.pose } else { &document.pose };
         let mixed = reblend(rest, &poses, from, &of(&committed.shares), &of(&shares))?;
         self.set_pose(mixed)?;
-        self.document_mut().shares = shares.into();
+        // The blend of factors is not the factor of the blend.
+        let document = self.document_mut();
+        (document.shares, document.proportions) = (shares.into(), Proportions::default());
         Ok(())
     }
 
@@ -504,10 +553,11 @@ impl Editor {
     ) -> Result<(), EditError> {
         let (cage, pose) = (&self.document().cage, self.document().pose.clone());
         let cage = RestCage::new(cage.mesh.clone(), change(cage.controls.clone()))?;
-        let shares = self.document().shares.clone();
+        let Document { shares, proportions, .. } = self.document().clone();
         self.set_cage(cage);
         self.set_pose(pose.to_vec())?;
-        self.document_mut().shares = shares;
+        let document = self.document_mut();
+        (document.shares, document.proportions) = (shares, proportions);
         Ok(())
     }
 

@@ -24,6 +24,10 @@ pub struct CageControls {
     pub elements: Vec<InnerElement>,
     /// Radius of points and lines, object units; null for 1/32 of the cage's longest side.
     pub radius: Option<f32>,
+    /// Loops of cage vertices around limbs, of a generated cage.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "typescript", ts(optional, as = "Option<Vec<Vec<u32>>>"))]
+    pub rings: Vec<Vec<u32>>,
 }
 
 /// A kind of inner control.
@@ -122,7 +126,9 @@ impl RestCage {
             Self::new(mesh, controls)
         };
         let smooth = CageControls { smooth: self.controls.smooth, ..CageControls::default() };
-        let (made, fault) = match with(self.inner_positions(), self.controls.clone()) {
+        // The rings are those of the replaced cage.
+        let kept = CageControls { rings: Vec::new(), ..self.controls.clone() };
+        let (made, fault) = match with(self.inner_positions(), kept) {
             Ok(made) => return Ok(made),
             Err(fault) if self.controls.inner > 0 => match with(&[], smooth) {
                 Ok(made) => {

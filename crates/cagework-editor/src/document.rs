@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use cagework_core::PolygonMesh;
 use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline};
+use cagework_pose::proportions::Proportions;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,8 @@ pub struct NamedPose {
     pub lead: f32,
     /// Interpolation of the animation from the previous pose to this one; `None` uses that of [`Transition`].
     pub interpolation: Option<Interpolation>,
+    /// Factors of the humanoid's proportions that the positions contain.
+    pub proportions: Proportions,
 }
 
 /// How the animation of the saved poses goes from one to the next, and how it ends.
@@ -64,6 +67,10 @@ pub struct Document {
     pub cage: Arc<RestCage>,
     /// Posed positions of cage vertices and inner controls; during reshaping, the new rest positions. `[n_controls]`
     pub pose: Arc<[Vec3]>,
+    /// Factors of the humanoid's proportions that `pose` contains.
+    pub proportions: Proportions,
+    /// The last pose that a change of the proportions made, and the same pose with factors of 1.
+    pub(crate) scaled_from: Option<(Arc<[Vec3]>, Arc<[Vec3]>)>,
     /// Saved poses, in their order in lists and in the animation.
     pub poses: Arc<Vec<NamedPose>>,
     /// Share of each saved pose in `pose`. `[n_poses]`
@@ -92,6 +99,7 @@ impl PartialEq for Document {
         self.models == other.models
             && self.cage == other.cage
             && self.pose == other.pose
+            && self.proportions == other.proportions
             && self.poses == other.poses
             && self.shares == other.shares
             && self.transition == other.transition
@@ -158,6 +166,7 @@ impl Document {
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.pose == other.pose
+            && self.proportions == other.proportions
             && self.key() == other.key()
             && self.models_key == other.models_key
             && (Arc::ptr_eq(&self.poses, &other.poses) || self.poses == other.poses)

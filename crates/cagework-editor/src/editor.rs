@@ -6,6 +6,8 @@ use cagework_core::view::View;
 use cagework_core::{Bounds, PolygonMesh};
 use cagework_io::{Model, write_project};
 use cagework_pose::blend::{VertexCountError, blend};
+use cagework_pose::humanoid::{Bone, Humanoid, HumanoidError};
+use cagework_pose::proportions::{HumanoidCage, Proportions};
 use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
@@ -18,6 +20,7 @@ use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
 use crate::options::{PROPORTIONAL_RADIUS, Tools};
+use crate::proportions::HumanoidCache;
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
@@ -48,6 +51,7 @@ pub struct Editor {
     /// Vertices of the element under the pointer.
     pub hovered: Vec<u32>,
     tools: Tools,
+    humanoid: HumanoidCache,
 }
 
 /// Contents that are opened together with models.
@@ -63,6 +67,8 @@ pub struct Contents {
     pub transition: Transition,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
+    /// Humanoid bones, and the names of the joints that the user has given them.
+    pub bones: Vec<(Bone, String)>,
     /// Identifier of the built-in sample that the contents belong to, if any.
     pub sample: Option<String>,
 }
@@ -97,7 +103,7 @@ impl Editor {
 
     /// Replaces models and contents, and clears the history.
     pub fn open(&mut self, models: impl IntoIterator<Item = NewModel>, contents: Contents) {
-        let Contents { cage, poses, mut shares, transition, pins, sample } = contents;
+        let Contents { cage, poses, mut shares, transition, pins, bones, sample } = contents;
         let tools = Tools { element: Element::default(), symmetry: false, ..self.tools };
         let (keys, steps) = (self.keys, self.steps + 1);
         let limit = self.history.limit();
@@ -106,6 +112,7 @@ impl Editor {
         let has_sample_cage = sample.is_some() && cage.is_some();
         let mut all = Models::default();
         all.add(models);
+        bones.into_iter().for_each(|(bone, joint)| all.set_bone(bone, Some(joint)));
         self.document = Document {
             models: all,
             poses: Arc::new(poses),
@@ -131,7 +138,9 @@ impl Editor {
     pub fn take_pose(&mut self, settings: &DocumentSettings) -> Result<(), &'static str> {
         let pose = settings.pose_of(&self.document);
         match &pose {
-            Ok(Some(pose)) if self.set_pose(pose.clone()).is_ok() => {}
+            Ok(Some(pose)) if self.set_pose(pose.clone()).is_ok() => {
+                self.document.proportions = settings.proportions;
+            }
             _ => self.reset_pose(),
         }
         self.amend();
@@ -241,6 +250,7 @@ impl Editor {
         self.document.cage_key = self.next_key();
         self.document.cage_id = cage_id(&cage.mesh);
         self.document.pose = cage.mesh.positions.as_slice().into();
+        self.document.proportions = Proportions::default();
         self.document.cage = Arc::new(cage);
         self.document.shares = vec![0.0; self.document.poses.len()].into();
         self.follow_cage();
@@ -371,6 +381,7 @@ impl Editor {
         if self.document.is_posed() {
             self.document.pose = self.document.cage.mesh.positions.as_slice().into();
         }
+        self.document.proportions = Proportions::default();
         if self.document.shares.iter().any(|&share| share != 0.0) {
             self.document.shares = vec![0.0; self.document.poses.len()].into();
         }
@@ -392,6 +403,26 @@ impl Editor {
             self.document.pose = positions.into();
         }
         Ok(())
+    }
+
+    /// Sets the pose that factors make of `own`, the pose with factors of 1. `[n_controls]` each
+    pub(crate) fn set_scaled_pose(&mut self, factors: Proportions, own: Arc<[Vec3]>, pose: Arc<[Vec3]>) {
+        self.document.proportions = factors;
+        self.document.scaled_from = Some((Arc::clone(&pose), own));
+        self.document.pose = pose;
+    }
+
+    /// Humanoid bones of the models of this document or of a changed copy of it.
+    pub(crate) fn humanoid_of(&mut self, document: &Document) -> Result<Humanoid, HumanoidError> {
+        self.humanoid.humanoid(document)
+    }
+
+    /// The cage, prepared for proportions. Computed once for each cage and models.
+    ///
+    /// # Errors
+    /// If the models are not a humanoid, or there is no cage.
+    pub fn humanoid_cage(&mut self) -> Result<Arc<HumanoidCage>, EditError> {
+        self.humanoid.cage(&self.document)
     }
 
     /// Moves the cage to its pose at a time of the animation of the saved poses, seconds.
@@ -539,6 +570,9 @@ impl Editor {
             animation_seconds: self.document.timeline().seconds(),
             pins: pins.to_vec(),
             posed: !self.editing_rest && self.document.is_posed(),
+            factors: self.document.all_factors(),
+            preset: self.document.preset().map(str::to_owned),
+            scaled: self.document.proportions != Proportions::default(),
             editing_rest: self.editing_rest,
             sample: sample.as_deref().map(str::to_owned),
             sample_cage: *has_sample_cage,

@@ -3,6 +3,8 @@
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, WriteError};
 use cagework_pose::blend::VertexCountError;
+use cagework_pose::humanoid::HumanoidError;
+use cagework_pose::proportions::ProportionError;
 use thiserror::Error;
 
 use crate::rest_edit::RestEditError;
@@ -78,6 +80,18 @@ pub enum EditError {
     /// A name selects no part of the model.
     #[error(transparent)]
     Part(#[from] SelectError),
+    /// The models are not a humanoid.
+    #[error(transparent)]
+    Humanoid(#[from] HumanoidError),
+    /// A proportion cannot be set.
+    #[error(transparent)]
+    Proportion(#[from] ProportionError),
+    /// No preset of proportions has the name.
+    #[error("there is no such preset; there are {known}")]
+    NoPreset {
+        /// Names of the presets.
+        known: String,
+    },
     /// The rig cannot be read.
     #[error(transparent)]
     Rig(#[from] WriteError),

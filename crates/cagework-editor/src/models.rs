@@ -14,10 +14,12 @@ use cagework_core::rig::Rig;
 use cagework_core::splats::Splats;
 use cagework_io::{Clip, Model, UnknownClip, UpAxis};
 use cagework_pose::Parts;
+use cagework_pose::humanoid::Bone;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::EditError;
+use crate::proportions::GivenBones;
 
 /// Largest number that is accepted from a project for the first triangle of a model. The limit leaves room for the
 /// triangles of models that are opened later.
@@ -103,12 +105,14 @@ pub struct Models {
     next_triangle: u32,
     /// Origin of the model that was opened first. It stays the same when that model is removed.
     origin: DVec3,
+    bones: GivenBones,
 }
 
-/// Compares the members.
+/// Compares the members and the given bones.
 impl PartialEq for Models {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.members, &other.members) || self.members == other.members
+        (Arc::ptr_eq(&self.members, &other.members) || self.members == other.members)
+            && self.bones == other.bones
     }
 }
 
@@ -444,6 +448,18 @@ impl Models {
             all.append(member.model.rest_rig().ok().flatten().as_ref(), n);
         }
         Some(all).filter(|rig| !rig.joints.is_empty())
+    }
+
+    /// Humanoid bones, and the names of the joints that the user has given them.
+    pub(crate) fn given_bones(&self) -> GivenBones {
+        Arc::clone(&self.bones)
+    }
+
+    /// Gives a humanoid bone the joint with a name; `None` forgets the given joint.
+    pub(crate) fn set_bone(&mut self, bone: Bone, joint: Option<String>) {
+        let bones = Arc::make_mut(&mut self.bones);
+        bones.retain(|(own, _)| *own != bone);
+        bones.extend(joint.map(|joint| (bone, joint)));
     }
 
     /// Parts of all models that stay in place or are rigid.

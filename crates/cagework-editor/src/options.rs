@@ -91,7 +91,9 @@ mod tests {
         let mut mesh = cube();
         mesh.positions[1].y = 0.25;
         let mut editor = Editor::default();
-        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
         assert_eq!(editor.view().unmatched, 0);
         editor.set_tools(Tools { symmetry: true, ..Tools::default() }, &FrontView);
         assert_eq!(editor.view().unmatched, 2, "vertices 0 and 1 were images of each other");

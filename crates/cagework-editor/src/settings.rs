@@ -6,6 +6,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
 use cagework_io::{Interpolation, MAX_SECONDS, SECONDS_PER_POSE, position_bytes, positions_of};
+use cagework_pose::humanoid::Bone;
+use cagework_pose::proportions::Proportions;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -29,6 +31,15 @@ pub struct DocumentSettings {
     /// at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
+    /// Factors of the proportions that the pose contains.
+    #[serde(skip_serializing_if = "is_unscaled")]
+    pub proportions: Proportions,
+    /// Factors of the proportions that each saved pose contains. If empty, 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pose_proportions: Vec<Proportions>,
+    /// Humanoid bones, and the names of the joints that the user has given them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bones: Vec<(Bone, String)>,
     /// Pinned surface points, which stay in place when the user pulls others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
@@ -70,11 +81,19 @@ impl DocumentSettings {
         let has_misfit = poses.iter().any(|pose| pose.positions.len() == n_controls && !document.fits(pose));
         let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
         let has_own = poses.iter().any(|pose| pose.interpolation.is_some());
+        let is_scaled = poses.iter().any(|pose| !is_unscaled(&pose.proportions));
         let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
         Self {
             sample: sample.as_deref().filter(|_| *has_sample_cage).map(str::to_owned),
             controls: (cage.controls != CageControls::default()).then(|| cage.controls.clone()),
             pose,
+            proportions: document.proportions,
+            pose_proportions: if is_scaled {
+                poses.iter().map(|pose| pose.proportions).collect()
+            } else {
+                Vec::new()
+            },
+            bones: models.given_bones().to_vec(),
             pins: pins.to_vec(),
             pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
             pose_fits: if has_misfit {
@@ -153,6 +172,7 @@ impl DocumentSettings {
             pins: self.pose_pins.get(k).cloned().flatten().map(Into::into),
             lead: self.pose_leads.get(k).copied().unwrap_or(SECONDS_PER_POSE),
             interpolation: self.pose_interpolations.get(k).copied().flatten(),
+            proportions: self.pose_proportions.get(k).copied().unwrap_or_default(),
         };
         poses.into_iter().enumerate().map(named).collect()
     }
@@ -170,6 +190,10 @@ impl DocumentSettings {
         let pose = positions_of(&bytes).filter(|pose| pose.len() == n_controls).ok_or(damaged)?;
         Ok(Some(up.turned(&pose).into_owned()))
     }
+}
+
+fn is_unscaled(proportions: &Proportions) -> bool {
+    *proportions == Proportions::default()
 }
 
 #[cfg(test)]

@@ -53,7 +53,14 @@ mod tests {
         let mut editor = Editor::default();
         editor.open([(Model::read("a.obj", text, &mut |_| None).unwrap(), None)], Contents::default());
         assert!(CageWatch::new(editor.document()).is_none(), "without a cage");
-        editor.apply(Command::ReplaceCage { mesh: cube(), controls: None, notices: Vec::new() }).unwrap();
+        editor
+            .apply(Command::ReplaceCage {
+                mesh: cube(),
+                controls: None,
+                notices: Vec::new(),
+                rings: Vec::new(),
+            })
+            .unwrap();
         let watch = CageWatch::new(editor.document()).unwrap();
         assert_eq!(watch.n_outside(editor.document()), 0);
         let half = Vec3::new(0.5, 1.0, 1.0);

@@ -11,6 +11,7 @@ use cagework_editor::{
     RestEdit, SurfacePoint, Transition,
 };
 use cagework_io::{Interpolation, Model, read_project};
+use cagework_pose::proportions::Proportions;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use glam::{DVec3, Vec3};
 
@@ -79,7 +80,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let models = editor.document().models.clone();
     let options = CageOptions { target: 40, ..CageOptions::default() };
     let made = generate(models.positions(), models.triangles(), &options, &NoProgress).unwrap();
-    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
+    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() };
     editor.apply(cage(made.cage.to_polygon_mesh())).unwrap();
     editor.amend();
     assert_eq!((editor.view().undo, editor.document().sample.as_deref()), (None, None));
@@ -192,7 +193,9 @@ fn exported_animation_is_the_one_that_plays() {
     editor.open([body], Contents::default());
     let bounds = editor.bounds().unwrap();
     let mesh = subdivided_box(bounds, 0.1, [1; 3]);
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor
+        .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+        .unwrap();
     let weights = bound(editor.document(), 16);
     for by in [Vec3::X, Vec3::new(0.0, 0.5, 0.25)] {
         let rest = editor.document().cage.mesh.positions.clone();
@@ -265,6 +268,7 @@ fn saved_and_opened(saved: &Editor) -> Document {
         shares: settings.pose_shares.clone(),
         transition: settings.transition.unwrap_or_default(),
         pins: settings.pins.clone(),
+        bones: settings.bones.clone(),
         sample: settings.sample.clone(),
     };
     let mut members = settings.models.iter().cloned();
@@ -325,7 +329,9 @@ fn opened_with_box() -> Editor {
     editor.open(two_blocks(), Contents::default());
     let bounds = editor.bounds().expect("valid input");
     let mesh = subdivided_box(bounds, 0.1, [1; 3]);
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).expect("valid input");
+    editor
+        .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+        .expect("valid input");
     editor.amend();
     editor
 }
@@ -371,7 +377,9 @@ fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
     let bounds = editor.bounds().unwrap();
     for k in 1..=4 {
         let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);
-        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
         assert!(editor.commit(format!("cage {k}")));
     }
     // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first of the four
@@ -379,7 +387,9 @@ fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
     assert_eq!(editor.view().forgotten, 0);
     for k in 5..=9 {
         let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);
-        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
         assert!(editor.commit(format!("cage {k}")));
     }
     let view = editor.view();
@@ -441,11 +451,20 @@ fn poses_are_carried_to_another_cage_by_one_step() {
     let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [2; 3]);
     let n = mesh.positions.len();
     let there: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X).collect();
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor
+        .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+        .unwrap();
     assert!(editor.commit("Make a cage"));
     assert_eq!((editor.view().poses[0].fits, editor.view().shares), (false, vec![0.0]));
     let carried = [there.clone(), there.clone()].concat();
-    editor.apply(Command::CarryPoses { from: other, positions: carried, shares: vec![1.0] }).unwrap();
+    editor
+        .apply(Command::CarryPoses {
+            from: other,
+            positions: carried,
+            shares: vec![1.0],
+            proportions: Proportions::default(),
+        })
+        .unwrap();
     assert!(editor.commit("Carry"));
     assert_eq!(*editor.document().pose, *there);
     assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, n));
@@ -539,7 +558,7 @@ fn a_pose_does_not_fit_another_cage_with_as_many_vertices() {
     let mut editor = opened_with_box();
     editor.apply(Command::SavePose { name: "one".to_owned() }).unwrap();
     let first = editor.document().cage.mesh.clone();
-    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
+    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() };
     let mesh = subdivided_box(editor.bounds().unwrap(), 0.2, [1; 3]);
     assert_eq!(mesh.positions.len(), first.positions.len());
     editor.apply(cage(mesh)).unwrap();

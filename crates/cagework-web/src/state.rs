@@ -523,7 +523,10 @@ mod tests {
 
     fn take_box(state: &mut State, margin: f32) {
         let mesh = subdivided_box(state.editor.bounds().unwrap(), margin, [1; 3]);
-        state.editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        state
+            .editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
     }
 
     /// Performs all uploads and returns their sequence.

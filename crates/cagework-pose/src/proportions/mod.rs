@@ -348,7 +348,7 @@ pub struct ProportionRange {
 }
 
 /// A cage of a humanoid, with weights of the bones at its vertices.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HumanoidCage {
     rest: Vec<Vec3>,
     weights: BoneWeights,
@@ -361,7 +361,7 @@ pub struct HumanoidCage {
 }
 
 /// Axes of a figure, and heights above the middle of its hip joints.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Frame {
     hips: DVec3,
     up: DVec3,

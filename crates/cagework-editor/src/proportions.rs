@@ -1,0 +1,291 @@
+//! Proportions of the humanoid that the models form: legs, arms, head and so on are scaled by factors.
+//!
+//! A change of the factors displaces the pose by the difference of two cages at rest: the one with the new factors minus
+//! the one with the old factors. So pulled vertices keep their displacement, and factors of 1 give the pulled pose.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use cagework_core::options::Choice;
+use cagework_core::{Frames, Weights};
+use cagework_pose::humanoid::{Bone, BoneSource, Humanoid, HumanoidError};
+use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, Proportion, Proportions};
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use crate::bound::{BoundDocument, BoundError};
+use crate::controls::RestCage;
+use crate::document::{Document, Key};
+use crate::editor::Editor;
+use crate::error::EditError;
+
+/// Distance from the cage at rest within which a pose without factors is at rest, relative to the size of the
+/// coordinates: a few roundings of 32-bit numbers.
+const ROUNDING: f64 = 1e-6;
+/// Maximum number of triangles in which folds are looked for. Larger models are sampled.
+const MAX_FOLD_TRIANGLES: usize = 10_000;
+
+/// Bones and the names of their joints that the user has given.
+pub(crate) type GivenBones = Arc<Vec<(Bone, String)>>;
+
+/// Humanoid bones of the models, for panels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct HumanoidInfo {
+    /// What told which joint is which bone; null if the skeleton is not that of a humanoid.
+    pub source: Option<BoneSource>,
+    /// Why the skeleton is not that of a humanoid, one sentence.
+    pub fault: Option<String>,
+    /// Bones in the order of [`Bone`]. Without a source, only the missing bones and those that the user has given.
+    pub bones: Vec<BoneView>,
+    /// Distinct names of the joints.
+    pub joints: Vec<String>,
+}
+
+/// A humanoid bone, as panels show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct BoneView {
+    /// The bone.
+    pub bone: Bone,
+    /// Name of its joint, if it has one.
+    pub joint: Option<String>,
+    /// Whether the user has chosen the joint.
+    pub given: bool,
+}
+
+/// Results that depend on the models, their given bones and the cage at rest. Recomputed when one of these changes.
+#[derive(Debug, Default)]
+pub(crate) struct HumanoidCache {
+    found: Option<((u64, GivenBones), Result<Humanoid, HumanoidError>)>,
+    cage: Option<((Key, GivenBones), Arc<HumanoidCage>)>,
+}
+
+impl HumanoidCache {
+    /// Humanoid bones of the models of a document.
+    pub(crate) fn humanoid(&mut self, document: &Document) -> Result<Humanoid, HumanoidError> {
+        let key = (document.mesh_key, document.models.given_bones());
+        if let Some((_, found)) = self.found.as_ref().filter(|(known, _)| *known == key) {
+            return found.clone();
+        }
+        let rig = document.models.rest_rig().unwrap_or_default();
+        let found = Humanoid::of_rig(&rig, &key.1);
+        self.found = Some((key, found.clone()));
+        found
+    }
+
+    /// The cage of a document, prepared for proportions.
+    pub(crate) fn cage(&mut self, document: &Document) -> Result<Arc<HumanoidCage>, EditError> {
+        let humanoid = self.humanoid(document)?;
+        if document.cage.mesh.faces.is_empty() {
+            return Err(EditError::NoCage);
+        }
+        let key = (document.key(), document.models.given_bones());
+        if let Some((_, cage)) = self.cage.as_ref().filter(|(known, _)| *known == key) {
+            return Ok(Arc::clone(cage));
+        }
+        let models = &document.models;
+        let rig = models.rest_rig().ok_or(HumanoidError::NoRig)?;
+        let (positions, _) = models.states(None).map_err(|_| EditError::NoModel)?;
+        let RestCage { mesh, controls, .. } = &*document.cage;
+        let cage = HumanoidCage::new(&mesh.positions, &controls.rings, &positions, &rig, &humanoid);
+        let cage = Arc::new(cage);
+        self.cage = Some((key, Arc::clone(&cage)));
+        Ok(cage)
+    }
+}
+
+impl Editor {
+    /// Humanoid bones of the models, for panels; `None` if the models have no skeleton.
+    pub fn humanoid_info(&mut self) -> Option<HumanoidInfo> {
+        let rig = self.document().models.rest_rig()?;
+        let given = self.document().models.given_bones();
+        let found = self.humanoid_of(&self.document().clone());
+        let joint_of = |bone: Bone| match &found {
+            Ok(humanoid) => {
+                humanoid.joint(bone).and_then(|joint| Some(rig.joints.get(joint as usize)?.name.clone()))
+            }
+            Err(_) => given.iter().find(|(own, _)| *own == bone).map(|(_, joint)| joint.clone()),
+        };
+        let is_shown = |bone: &Bone| match &found {
+            Ok(_) => true,
+            Err(HumanoidError::Missing { missing, .. }) if missing.contains(bone) => true,
+            Err(_) => given.iter().any(|(own, _)| own == bone),
+        };
+        let bones = Bone::ALL.iter().map(|(_, bone)| *bone).filter(is_shown).map(|bone| BoneView {
+            bone,
+            joint: joint_of(bone),
+            given: given.iter().any(|(own, _)| *own == bone),
+        });
+        let mut joints: Vec<String> = rig.joints.iter().map(|joint| joint.name.clone()).collect();
+        joints.sort();
+        joints.dedup();
+        Some(HumanoidInfo {
+            bones: bones.collect(),
+            joints,
+            source: found.as_ref().ok().map(Humanoid::source),
+            fault: found.err().map(|fault| fault.to_string()),
+        })
+    }
+
+    /// Sets the factor of a proportion by name, such as "leg" or "left_leg".
+    pub(crate) fn set_proportion(&mut self, name: &str, factor: f64) -> Result<(), EditError> {
+        let mut next = self.document().proportions;
+        next.set(name, factor)?;
+        self.set_proportions(next)
+    }
+
+    /// Sets the factors of a preset; the others become 1.
+    pub(crate) fn set_preset(&mut self, name: &str) -> Result<(), EditError> {
+        let preset = PRESETS.iter().find(|preset| preset.name == name);
+        let known = || PRESETS.map(|preset| preset.name).join(", ");
+        let next = preset.ok_or_else(|| EditError::NoPreset { known: known() })?.proportions()?;
+        self.set_proportions(next)
+    }
+
+    /// Gives the right side the factors of the left side.
+    pub(crate) fn mirror_proportions(&mut self) -> Result<(), EditError> {
+        let mut next = self.document().proportions;
+        for (name, proportion) in Proportion::ALL {
+            let left = next.factor(*proportion, 0);
+            next.set(name, left)?;
+        }
+        self.set_proportions(next)
+    }
+
+    /// Moves the cage by the difference of two sets of factors.
+    pub(crate) fn set_proportions(&mut self, next: Proportions) -> Result<(), EditError> {
+        if next == self.document().proportions {
+            return Ok(());
+        }
+        let cage = self.humanoid_cage()?;
+        let own = self.document().without_proportions(&cage);
+        let pose = with_proportions(&own, &self.document().cage.mesh.positions, &cage, &next);
+        self.set_scaled_pose(next, own, pose);
+        Ok(())
+    }
+
+    /// Names the joint of a bone; `None` leaves it to what the file says. Keeps the factors, and moves the cage to
+    /// where they bring it with the new bone.
+    pub(crate) fn set_bone(&mut self, bone: Bone, joint: Option<String>) -> Result<(), EditError> {
+        let before = self.humanoid_cage().ok();
+        let own = before.as_ref().map(|cage| self.document().without_proportions(cage));
+        let mut next = self.document().clone();
+        next.models.set_bone(bone, joint);
+        match self.humanoid_of(&next) {
+            // Several bones of an unknown skeleton are named one after the other.
+            Err(fault) if before.is_some() || !matches!(fault, HumanoidError::Missing { .. }) => {
+                return Err(fault.into());
+            }
+            _ => {}
+        }
+        self.change_parts(|models| {
+            *models = next.models;
+            Ok(())
+        })?;
+        let factors = self.document().proportions;
+        if let (Some(own), Ok(cage)) = (own, self.humanoid_cage())
+            && factors != Proportions::default()
+        {
+            let pose = with_proportions(&own, &self.document().cage.mesh.positions, &cage, &factors);
+            self.set_scaled_pose(factors, own, pose);
+        }
+        Ok(())
+    }
+}
+
+impl Document {
+    /// The pose without its factors, object units. `[n_controls]`
+    fn without_proportions(&self, cage: &HumanoidCage) -> Arc<[Vec3]> {
+        if self.proportions == Proportions::default() {
+            return Arc::clone(&self.pose);
+        }
+        let known = self.scaled_from.as_ref().filter(|(scaled, _)| Arc::ptr_eq(scaled, &self.pose));
+        if let Some((_, own)) = known {
+            return Arc::clone(own);
+        }
+        let rest = &self.cage.mesh.positions;
+        let scaled = cage.pose(&self.proportions);
+        let own = |((&at, &rest), &scaled): ((&Vec3, &Vec3), &Vec3)| {
+            let by: DVec3 = at.as_dvec3() - scaled.as_dvec3();
+            let size = f64::from(at.abs().max(scaled.abs()).max_element());
+            // Exactly at rest, so that the cage counts as not posed.
+            if by.length() <= ROUNDING * size { rest } else { (rest.as_dvec3() + by).as_vec3() }
+        };
+        self.pose.iter().zip(rest).zip(&scaled).map(own).collect()
+    }
+
+    /// Names and factors of all proportions, each side of those with two sides alone: "left_leg", "right_leg", "head".
+    pub(crate) fn all_factors(&self) -> BTreeMap<String, f64> {
+        let of = |&(name, proportion): &(&str, Proportion)| {
+            let factor = |side| self.proportions.factor(proportion, side);
+            if proportion.facts().is_sided {
+                vec![(format!("left_{name}"), factor(0)), (format!("right_{name}"), factor(1))]
+            } else {
+                vec![(name.to_owned(), factor(0))]
+            }
+        };
+        Proportion::ALL.iter().flat_map(of).collect()
+    }
+
+    /// Name of the preset that the factors are, if they are one.
+    pub(crate) fn preset(&self) -> Option<&'static str> {
+        let is_it = |preset: &&Preset| preset.proportions().is_ok_and(|factors| factors == self.proportions);
+        PRESETS.iter().find(is_it).map(|preset| preset.name)
+    }
+}
+
+/// A pose without factors, moved by factors. `[n_controls]`
+fn with_proportions(
+    own: &Arc<[Vec3]>,
+    rest: &[Vec3],
+    cage: &HumanoidCage,
+    factors: &Proportions,
+) -> Arc<[Vec3]> {
+    if *factors == Proportions::default() {
+        return Arc::clone(own);
+    }
+    let at = |((own, rest), scaled): ((&Vec3, &Vec3), Vec3)| {
+        (own.as_dvec3() + (scaled.as_dvec3() - rest.as_dvec3())).as_vec3()
+    };
+    own.iter().zip(rest).zip(cage.pose(factors)).map(at).collect()
+}
+
+/// A part of a bound model, in which the ranges of the proportions without folds are measured.
+pub struct FoldSample {
+    /// The cage with the bones.
+    pub cage: Arc<HumanoidCage>,
+    /// Weights of the vertices.
+    pub weights: Weights,
+    /// Frames of the weights.
+    pub frames: Arc<Frames>,
+    /// Vertices at rest, object units.
+    pub positions: Vec<Vec3>,
+    /// Triangles of these vertices, at most 10,000.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl BoundDocument<'_> {
+    /// Takes triangles of the models, for [`HumanoidCage::ranges`]. `cage`: from [`Editor::humanoid_cage`].
+    ///
+    /// # Errors
+    /// Before a bind.
+    pub fn fold_sample(&self, cage: Arc<HumanoidCage>) -> Result<FoldSample, BoundError> {
+        let bound = self.require_bound()?;
+        let models = &self.document().models;
+        let step = models.triangles().len().div_ceil(MAX_FOLD_TRIANGLES).max(1);
+        let mut number = vec![None; models.positions().len()];
+        let mut vertices: Vec<u32> = Vec::new();
+        let mut own = |v: u32| {
+            *number[v as usize].get_or_insert_with(|| {
+                vertices.push(v);
+                vertices.len() as u32 - 1
+            })
+        };
+        let triangles = models.triangles().iter().step_by(step).map(|t| t.map(&mut own)).collect();
+        let positions = vertices.iter().map(|&v| models.positions()[v as usize]).collect();
+        let (weights, frames) = (bound.weights.with_rows(&vertices), Arc::clone(&bound.frames));
+        Ok(FoldSample { cage, weights, frames, positions, triangles })
+    }
+}

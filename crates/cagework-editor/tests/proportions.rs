@@ -1,0 +1,184 @@
+//! Proportions of a humanoid: factors displace the pose, and are undone, saved and restored with it.
+
+use std::sync::LazyLock;
+
+use cagework_cage::samples;
+use cagework_core::subdivided_box;
+use cagework_editor::{Command, Contents, DocumentSettings, Editor};
+use cagework_io::{Model, read_project, write_mesh_glb};
+use cagework_pose::humanoid::Bone;
+use cagework_pose::proportions::Proportion;
+use glam::Vec3;
+
+/// Rounding of 32-bit coordinates of about 2 units.
+const ROUNDING: f32 = 1e-6;
+
+/// The humanoid sample as a GLB file.
+static GLB: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let sample = samples::build("humanoid").expect("a sample");
+    write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).expect("valid input")
+});
+
+fn opened(glb: &[u8]) -> Editor {
+    let mut editor = Editor::default();
+    editor.open([(Model::read("a.glb", glb, &mut |_| None).unwrap(), None)], Contents::default());
+    let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [4, 8, 2]);
+    let rings = vec![vec![0, 1, 2]];
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings }).unwrap();
+    editor.amend();
+    editor
+}
+
+fn set(editor: &mut Editor, name: &str, factor: f64) {
+    editor.apply(Command::SetProportion { name: name.to_owned(), factor }).unwrap();
+}
+
+fn pull(editor: &mut Editor) {
+    let mut pose = editor.document().pose.to_vec();
+    pose[3] += Vec3::new(0.1, 0.2, -0.3);
+    editor.set_pose(pose).unwrap();
+}
+
+fn factors(editor: &Editor) -> [f64; 2] {
+    [0, 1].map(|side| editor.document().proportions.factor(Proportion::Leg, side))
+}
+
+/// Height of the posed cage.
+fn height(editor: &Editor) -> f32 {
+    let ys = || editor.document().pose.iter().map(|p| p.y);
+    ys().fold(f32::MIN, f32::max) - ys().fold(f32::MAX, f32::min)
+}
+
+fn farthest(a: &[Vec3], b: &[Vec3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_pull_is_kept_while_factors_change_and_after_they_are_reset() {
+    let mut editor = opened(&GLB);
+    let at_rest = height(&editor);
+    set(&mut editor, "leg", 1.3);
+    assert!(height(&editor) > at_rest + 0.15, "a leg of 0.8 units becomes 0.24 units longer");
+    pull(&mut editor);
+    let pulled_by = |editor: &Editor, rest: Vec3| editor.document().pose[3] - rest;
+    set(&mut editor, "leg", 1.0);
+    let rest = editor.document().cage.mesh.positions.clone();
+    assert!(pulled_by(&editor, rest[3]).distance(Vec3::new(0.1, 0.2, -0.3)) < ROUNDING);
+    assert_eq!(editor.document().pose[4..], rest[4..], "all other vertices are exactly at rest");
+
+    let pulled = editor.document().pose.clone();
+    for factor in [1.1, 1.25, 0.7] {
+        set(&mut editor, "leg", factor);
+        set(&mut editor, "head", factor);
+    }
+    assert_ne!(editor.document().pose, pulled);
+    editor.apply(Command::SetPreset { name: None }).unwrap();
+    assert_eq!(editor.document().pose, pulled, "exactly");
+}
+
+#[test]
+fn a_drag_of_a_slider_is_one_step_that_undoes_factors_and_pose() {
+    let mut editor = opened(&GLB);
+    pull(&mut editor);
+    editor.commit("Pull");
+    let pulled = editor.document().pose.clone();
+    for k in 0..10 {
+        set(&mut editor, "left_leg", 1.0 + 0.03 * f64::from(k));
+    }
+    assert!(editor.commit("Legs"));
+    let scaled = editor.document().pose.clone();
+    assert_eq!(factors(&editor), [1.27, 1.0]);
+    assert!(editor.undo());
+    assert_eq!((factors(&editor), &editor.document().pose), ([1.0, 1.0], &pulled));
+    assert!(editor.redo());
+    assert_eq!((factors(&editor), &editor.document().pose), ([1.27, 1.0], &scaled));
+    editor.apply(Command::MirrorProportions).unwrap();
+    assert_eq!(factors(&editor), [1.27, 1.27]);
+    editor.apply(Command::ResetPose).unwrap();
+    assert_eq!(factors(&editor), [1.0, 1.0]);
+    assert!(!editor.document().is_posed());
+}
+
+#[test]
+fn saved_poses_restore_their_factors_and_a_blend_shows_factors_of_1() {
+    let mut editor = opened(&GLB);
+    editor.apply(Command::SavePose { name: "rest".to_owned() }).unwrap();
+    editor.apply(Command::SetPreset { name: Some("longer legs".to_owned()) }).unwrap();
+    assert_eq!(editor.view().preset.as_deref(), Some("longer legs"));
+    pull(&mut editor);
+    editor.apply(Command::SavePose { name: "long".to_owned() }).unwrap();
+    let long = editor.document().pose.clone();
+    editor.apply(Command::ApplyPose { index: 0 }).unwrap();
+    assert_eq!((factors(&editor), editor.view().scaled), ([1.0, 1.0], false));
+    editor.apply(Command::ApplyPose { index: 1 }).unwrap();
+    assert_eq!((factors(&editor), editor.view().scaled), ([1.2, 1.2], true));
+    set(&mut editor, "leg", 1.0);
+    assert_eq!(editor.document().pose[4..], editor.document().cage.mesh.positions[4..]);
+    set(&mut editor, "leg", 1.2);
+    assert!(farthest(&editor.document().pose, &long) < ROUNDING);
+    editor.commit("Pose");
+    editor.apply(Command::Blend { index: 0, share: 0.5 }).unwrap();
+    assert_eq!(factors(&editor), [1.0, 1.0]);
+}
+
+#[test]
+fn a_project_keeps_factors_rings_and_given_bones() {
+    let mut editor = opened(&GLB);
+    let toes = Command::SetBone { bone: Bone::LeftToes, joint: Some("foot.L".to_owned()) };
+    assert!(editor.apply(toes).is_err(), "the joint is the left foot");
+    let chest = Command::SetBone { bone: Bone::Chest, joint: Some("spine".to_owned()) };
+    editor.apply(chest).unwrap();
+    set(&mut editor, "leg", 1.2);
+    set(&mut editor, "left_arm", 0.9);
+    editor.apply(Command::SavePose { name: "a".to_owned() }).unwrap();
+    set(&mut editor, "head", 1.5);
+    pull(&mut editor);
+    let project = editor.write_project("{}").unwrap();
+    let project = read_project("a.glb", &project, 1 << 28).unwrap().unwrap();
+    let settings = DocumentSettings::read(&project.settings);
+    let (cage, _) = settings.cage(&project.cage);
+    let contents = Contents {
+        poses: settings.poses(project.poses, cage.as_ref()),
+        cage,
+        bones: settings.bones.clone(),
+        ..Contents::default()
+    };
+    let mut again = Editor::default();
+    again.open(project.models.into_iter().map(|model| (model, None)), contents);
+    again.take_pose(&settings).unwrap();
+    let (a, b) = (editor.document(), again.document());
+    assert_eq!((a.proportions, &a.poses, &a.pose), (b.proportions, &b.poses, &b.pose));
+    assert_eq!(b.cage.controls.rings, [[0, 1, 2]]);
+    assert!(again.humanoid_info().unwrap().bones.iter().any(|bone| bone.given && bone.bone == Bone::Chest));
+    again.apply(Command::SetPreset { name: None }).unwrap();
+    assert_eq!(again.document().pose[4..], again.document().cage.mesh.positions[4..]);
+
+    let old = DocumentSettings::read(r#"{"proportions": {"leg": 7}, "pose_proportions": [{"tail": 1}]}"#);
+    assert_eq!(old, DocumentSettings::default());
+}
+
+#[test]
+fn models_that_are_no_humanoid_get_a_reason() {
+    let mut editor = opened(&GLB);
+    let info = editor.humanoid_info().unwrap();
+    assert_eq!((info.fault, info.bones.len()), (None, 22));
+    let mut pillar = Editor::default();
+    let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    pillar.open([(Model::read("a.obj", obj, &mut |_| None).unwrap(), None)], Contents::default());
+    assert_eq!(pillar.humanoid_info(), None);
+    let wrong = pillar.apply(Command::SetProportion { name: "leg".to_owned(), factor: 1.2 }).unwrap_err();
+    assert!(wrong.to_string().contains("no skeleton"), "{wrong}");
+
+    // A snake: the joints of the sample without arms.
+    let sample = samples::build("rat").unwrap();
+    let glb = write_mesh_glb("rat", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
+    let mut rat = opened(&glb);
+    if let Some(info) = rat.humanoid_info() {
+        assert!(info.fault.is_some_and(|fault| fault.contains("not recognised as a humanoid")));
+        assert_eq!(info.source, None);
+    }
+    let wrong = editor.apply(Command::SetProportion { name: "leg".to_owned(), factor: 3.0 }).unwrap_err();
+    assert!(wrong.to_string().contains("0.5 to 2"), "{wrong}");
+    let wrong = editor.apply(Command::SetPreset { name: Some("giant".to_owned()) }).unwrap_err();
+    assert!(wrong.to_string().contains("chibi"), "{wrong}");
+}
