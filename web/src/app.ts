@@ -13,6 +13,7 @@ import { createModels } from "./actions/models";
 import { createPainting } from "./actions/painting";
 import { createPoses } from "./actions/poses";
 import { createProject } from "./actions/project";
+import { createProportions } from "./actions/proportions";
 import { createPulling } from "./actions/pull";
 import { createTour } from "./actions/tour";
 import { createView } from "./actions/view";
@@ -62,6 +63,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
   const openFiles = (list: readonly NamedFile[]) => files.openFiles(list);
   const models = createModels(ctx, { cage, edit, checked, openFiles, settle });
   const painting = createPainting(ctx, edit, settle);
+  const proportions = createProportions(ctx, edit);
   const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project, pull);
   const startFresh = () => void files.openSample(store.get().samples[0] ?? "");
@@ -119,6 +121,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     controls,
     bind,
     poses,
+    proportions,
     clips,
     view,
     files,

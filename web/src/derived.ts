@@ -13,14 +13,14 @@ import { SHAPE_FORMATS, SPLAT_FORMATS } from "./defaults";
 import type { AppState, CageSettings, ShapeFormat } from "./state";
 
 /** The rig options that apply to the open model. */
-export function rigOf({ model, rigOptions }: AppState): RigOptions {
+export function rigOf({ model, rigOptions, scaled }: AppState): RigOptions {
   // Options of a project may name parts that the open model does not have.
   const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
   const follow = (model?.joints ?? 0) > 0 && rigOptions.joints !== "stay";
   return {
     ...rigOptions,
     rigid,
-    ground: rigOptions.ground && follow,
+    ground: (rigOptions.ground || (scaled && !rigOptions.ground_off)) && follow,
     feet: follow ? rigOptions.feet : "free",
     dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0,
   };

@@ -43,6 +43,8 @@ export function followDocument(ctx: Context) {
     const isAlone = info.members.length === 1 && model?.members.length === 1;
     const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
     return {
+      humanoid: engine().humanoidInfo() ?? null,
+      folds: null,
       model: {
         ...info,
         name: isAlone ? model.name : T.models.several(info.name, info.members.length - 1),
@@ -64,6 +66,7 @@ export function followDocument(ctx: Context) {
     check: checks.get(keyOf(view)) ?? null,
     pullReady: false,
     report: null,
+    folds: null,
     earlier: [],
     scene: { ...store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
   });
@@ -97,7 +100,7 @@ export function followDocument(ctx: Context) {
         ...(view.models === (before?.models ?? 0) ? {} : modelPatch()),
         ...(isOther ? cagePatch(view) : {}),
         ...(view.cage === before?.cage ? {} : settingsPatch(view)),
-        ...(isNewlyBound ? { report: engine().boundReport() ?? null } : {}),
+        ...(isNewlyBound ? { report: engine().boundReport() ?? null, folds: null } : {}),
         ...(hasOtherColours ? { legend: engine().legend() ?? null } : {}),
       });
       if (view.forgotten > 0 && !before?.forgotten) ctx.tell.say(T.did.forgotten);

@@ -87,9 +87,9 @@ export function decimals(value: number): string {
   return format.decimals.format(value);
 }
 
-/** Formats a fraction as a percentage, clamped to the range from 0 to 100 %. */
-export function percent(share: number, maximumFractionDigits = 0): string {
-  const clamped = Math.min(1, Math.max(0, share));
+/** Formats a fraction as a percentage, clamped to the range from 0 to `max`, by default 100 %. */
+export function percent(share: number, maximumFractionDigits = 0, max = 1): string {
+  const clamped = Math.min(max, Math.max(0, share));
   return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
 }
 

@@ -13,7 +13,8 @@ export type Kind =
   | "compare"
   | "pull"
   | "slice"
-  | "lattice";
+  | "lattice"
+  | "folds";
 
 export interface Queue {
   /** Runs `work` after all earlier work of its kind. */

@@ -22,6 +22,7 @@ import type {
   NamedFile,
   OpenContents,
   Problem,
+  ProportionRange,
   PullFrame,
   Repair,
   UpAxis,
@@ -372,6 +373,9 @@ async function start(opened: OpenResult & Needs) {
     pullGrab: (grab: GrabInput): Job<GrabResult> => ofNow(pulling().run("pullGrab", grab)),
     /** Solves one frame of the pull, in the worker for pulls. `to`: targets of the grabbed points, `[n_grabs, 3]`. */
     pullFrame: (to: Float32Array): Job<PullFrame> => ofNow(pulling().run("pullFrame", { to })),
+    /** Measures the factors of proportions beyond which the bound humanoid folds, in the worker. */
+    proportionRanges: (): Job<readonly ProportionRange[]> =>
+      ofNow(client.run("folds", () => engine.foldSample())),
     /** Creates a zip archive of files with distinct names. */
     zip: (files: readonly { readonly name: string; readonly bytes: Uint8Array }[]) =>
       pkg.Engine.zipFiles(

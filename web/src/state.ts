@@ -4,10 +4,12 @@ import type {
   BindOptions,
   BindReport,
   CageState,
+  HumanoidInfo,
   InnerKind,
   Legend,
   ModelInfo,
   Problem,
+  ProportionRange,
   Stage,
   WebGpuFault,
 } from "./contract";
@@ -78,6 +80,10 @@ export const DOCUMENT_STATE = {
   /** Reports of earlier binds of this cage, for comparison, latest first. */
   earlier: [] as readonly BindReport[],
   legend: null as Legend | null,
+  /** Humanoid bones of the models; null without a skeleton. */
+  humanoid: null as HumanoidInfo | null,
+  /** Factors of proportions beyond which the model folds; null until they are measured for the current weights. */
+  folds: null as readonly ProportionRange[] | null,
   /** Whether the worker for pulls is prepared, or being prepared, for the current model and cage. */
   pullReady: false,
 };
@@ -125,6 +131,8 @@ export const MODEL_STATE = {
   /** Whether pulls move the whole model. */
   pullWhole: false,
   playing: false,
+  /** Whether the left and right parts of a humanoid have sliders of their own. */
+  apart: false,
   /** The brush that paints which vertices of a model stay in place; null while nothing is painted. */
   painting: null as Painting | null,
   /** The clip shown in place of the cage's pose. */

@@ -20,7 +20,7 @@ use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
 use crate::options::{PROPORTIONAL_RADIUS, Tools};
-use crate::proportions::HumanoidCache;
+use crate::proportions::{HumanoidCache, HumanoidInfo};
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
@@ -410,6 +410,11 @@ impl Editor {
         self.document.proportions = factors;
         self.document.scaled_from = Some((Arc::clone(&pose), own));
         self.document.pose = pose;
+    }
+
+    /// Humanoid bones of the models, for panels; `None` if the models have no skeleton.
+    pub fn humanoid_info(&mut self) -> Option<HumanoidInfo> {
+        self.humanoid.info(&self.document)
     }
 
     /// Humanoid bones of the models of this document or of a changed copy of it.

@@ -42,6 +42,8 @@ pub struct RigOptions {
     pub plain: bool,
     /// Whether the cage deforms the model after a clip has moved it.
     pub dynamic: bool,
+    /// Whether the user has switched `ground` off, so that changed proportions do not switch it on.
+    pub ground_off: bool,
 }
 
 /// Radius of proportional editing.

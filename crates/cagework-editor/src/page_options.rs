@@ -7,6 +7,7 @@ use cagework_core::options::{
     Backend, GRID, INNER_RADIUS, MAX_ITERATIONS, Number, RangeError, SMOOTH_STEPS, SPARSIFY, TAU,
 };
 use cagework_io::value_fault;
+use cagework_pose::proportions::FACTOR;
 use cagework_pose::pull::REACH;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -21,7 +22,7 @@ const BIND_LIMIT: u64 = 2 << 30;
 const MAX_VALUE_CHARS: usize = 40;
 
 /// Numeric options of the page.
-pub const NUMBERS: [Number; 14] = [
+pub const NUMBERS: [Number; 15] = [
     GRID,
     TAU,
     MAX_ITERATIONS,
@@ -36,6 +37,7 @@ pub const NUMBERS: [Number; 14] = [
     PROPORTIONAL_RADIUS,
     BRUSH,
     REACH,
+    FACTOR,
 ];
 
 /// Options of a bind, and the processor that it runs on.
@@ -179,7 +181,7 @@ mod tests {
         saved["cage"]["target"] = json!(120);
         saved["rig"] = json!({
             "joints": "stay", "keep_travel": true, "ground": true, "feet": "lock", "rigid": ["hat"],
-            "expressions": true, "plain": false, "dynamic": true,
+            "expressions": true, "plain": false, "dynamic": true, "ground_off": true,
         });
         saved["symmetry"] = json!(true);
         let settings = read(&saved);

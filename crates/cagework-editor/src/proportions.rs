@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cagework_core::options::Choice;
+use cagework_core::rig::Rig;
 use cagework_core::{Frames, Weights};
 use cagework_pose::humanoid::{Bone, BoneSource, Humanoid, HumanoidError};
 use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, Proportion, Proportions};
@@ -59,6 +60,7 @@ pub struct BoneView {
 #[derive(Debug, Default)]
 pub(crate) struct HumanoidCache {
     found: Option<((u64, GivenBones), Result<Humanoid, HumanoidError>)>,
+    info: Option<((u64, GivenBones), Option<HumanoidInfo>)>,
     cage: Option<((Key, GivenBones), Arc<HumanoidCage>)>,
 }
 
@@ -94,14 +96,21 @@ impl HumanoidCache {
         self.cage = Some((key, Arc::clone(&cage)));
         Ok(cage)
     }
+
+    /// Humanoid bones of the models of a document, for panels.
+    pub(crate) fn info(&mut self, document: &Document) -> Option<HumanoidInfo> {
+        let key = (document.mesh_key, document.models.given_bones());
+        if self.info.as_ref().is_none_or(|(known, _)| *known != key) {
+            let rig = document.models.rest_rig();
+            let info = rig.map(|rig| HumanoidInfo::of(&rig, &key.1, self.humanoid(document)));
+            self.info = Some((key, info));
+        }
+        self.info.as_ref().and_then(|(_, info)| info.clone())
+    }
 }
 
-impl Editor {
-    /// Humanoid bones of the models, for panels; `None` if the models have no skeleton.
-    pub fn humanoid_info(&mut self) -> Option<HumanoidInfo> {
-        let rig = self.document().models.rest_rig()?;
-        let given = self.document().models.given_bones();
-        let found = self.humanoid_of(&self.document().clone());
+impl HumanoidInfo {
+    fn of(rig: &Rig, given: &[(Bone, String)], found: Result<Humanoid, HumanoidError>) -> Self {
         let joint_of = |bone: Bone| match &found {
             Ok(humanoid) => {
                 humanoid.joint(bone).and_then(|joint| Some(rig.joints.get(joint as usize)?.name.clone()))
@@ -121,14 +130,16 @@ impl Editor {
         let mut joints: Vec<String> = rig.joints.iter().map(|joint| joint.name.clone()).collect();
         joints.sort();
         joints.dedup();
-        Some(HumanoidInfo {
+        Self {
             bones: bones.collect(),
             joints,
             source: found.as_ref().ok().map(Humanoid::source),
             fault: found.err().map(|fault| fault.to_string()),
-        })
+        }
     }
+}
 
+impl Editor {
     /// Sets the factor of a proportion by name, such as "leg" or "left_leg".
     pub(crate) fn set_proportion(&mut self, name: &str, factor: f64) -> Result<(), EditError> {
         let mut next = self.document().proportions;

@@ -169,14 +169,23 @@ fn models_that_are_no_humanoid_get_a_reason() {
     let wrong = pillar.apply(Command::SetProportion { name: "leg".to_owned(), factor: 1.2 }).unwrap_err();
     assert!(wrong.to_string().contains("no skeleton"), "{wrong}");
 
-    // A snake: the joints of the sample without arms.
-    let sample = samples::build("rat").unwrap();
-    let glb = write_mesh_glb("rat", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
-    let mut rat = opened(&glb);
-    if let Some(info) = rat.humanoid_info() {
-        assert!(info.fault.is_some_and(|fault| fault.contains("not recognised as a humanoid")));
-        assert_eq!(info.source, None);
+    let mut sample = samples::build("humanoid").unwrap();
+    let names = ["link 0", "link 1", "link 2", "link 3"];
+    for (k, joint) in sample.rig.iter_mut().flat_map(|rig| &mut rig.joints).enumerate() {
+        joint.name = names[k.min(3)];
+        (joint.at, joint.parent) = (Vec3::new(0.0, 0.1 * k as f32, 0.0), k.checked_sub(1));
     }
+    let glb = write_mesh_glb("snake", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
+    let mut snake = opened(&glb);
+    let info = snake.humanoid_info().unwrap();
+    assert!(info.fault.is_some_and(|fault| fault.contains("no joint was found for hips")));
+    assert_eq!((info.source, info.bones.len(), info.joints), (None, 14, names.map(str::to_owned).to_vec()));
+    let head = |joint: &str| Command::SetBone { bone: Bone::Head, joint: Some(joint.to_owned()) };
+    snake.apply(head("link 2")).unwrap();
+    let given = snake.humanoid_info().unwrap().bones.into_iter().find(|bone| bone.given).unwrap();
+    assert_eq!((given.bone, given.joint.as_deref()), (Bone::Head, Some("link 2")));
+    assert!(snake.apply(head("link 9")).unwrap_err().to_string().contains("there is no joint"));
+
     let wrong = editor.apply(Command::SetProportion { name: "leg".to_owned(), factor: 3.0 }).unwrap_err();
     assert!(wrong.to_string().contains("0.5 to 2"), "{wrong}");
     let wrong = editor.apply(Command::SetPreset { name: Some("giant".to_owned()) }).unwrap_err();

@@ -13,19 +13,21 @@ use cagework_core::report::BindReport;
 use cagework_core::{Coordinates, ProgressEvent};
 use cagework_editor::edit::{GestureView, SelectMode};
 use cagework_editor::{
-    CageState, Command, ModelInfo, NUMBERS, PageBindOptions, RigOptions, Settings, fields,
+    CageState, Command, HumanoidInfo, ModelInfo, NUMBERS, PageBindOptions, RigOptions, Settings, fields,
 };
 use cagework_gpu::render::colormap::Legend;
 use cagework_gpu::render::{CameraView, GizmoPart};
 use cagework_gpu::session::MAX_PICTURE;
 use cagework_io::{FormatFacts, ModelFormat};
+use cagework_pose::proportions::{PRESETS, Proportion, ProportionRange};
 use cagework_pose::pull::DragOptions;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use ts_rs::{Config, TS, TypeVisitor};
 
 use crate::binder::BuiltSample;
 use crate::cage::RigArrays;
 use crate::error::ErrorName;
+use crate::folds::FoldArrays;
 use crate::opening::OpenContents;
 use crate::options::JsSceneOptions;
 use crate::puller::{GrabInput, GrabResult, PullFrame};
@@ -88,6 +90,9 @@ fn generated_types_are_up_to_date() {
     found.visit::<GrabInput>();
     found.visit::<GrabResult>();
     found.visit::<PullFrame>();
+    found.visit::<HumanoidInfo>();
+    found.visit::<FoldArrays>();
+    found.visit::<ProportionRange>();
     found.visit::<Legend>();
     found.visit::<SelectMode>();
     found.visit::<GestureView>();
@@ -135,6 +140,16 @@ fn generated_types_are_up_to_date() {
     }
     writeln!(text, " }} as const;\nexport const BOX_DIVISIONS = {BOX_DIVISIONS};").unwrap();
     writeln!(text, "export const HULL_TARGET = {HULL_TARGET};").unwrap();
+    let proportions = Proportion::ALL.iter().map(|(name, proportion)| {
+        let facts = proportion.facts();
+        let (group, sided, natural) = (facts.group, facts.is_sided, facts.natural);
+        json!({ "name": name, "group": group, "sided": sided, "natural": natural })
+    });
+    let about = "Proportions of a humanoid, in the order of their sliders.";
+    writeln!(text, "/** {about} */\nexport const PROPORTIONS = {} as const;", Value::from_iter(proportions))
+        .unwrap();
+    let presets = PRESETS.map(|preset| preset.name);
+    writeln!(text, "/** Presets of proportions. */\nexport const PRESETS = {presets:?} as const;").unwrap();
     let about = "Maximum length of a picture's longer side, pixels.";
     writeln!(text, "/** {about} */\nexport const MAX_PICTURE = {MAX_PICTURE};").unwrap();
     let solver = |method: Method| serde_json::to_value(method.usual_solver()).unwrap();

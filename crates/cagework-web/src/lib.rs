@@ -21,6 +21,7 @@ mod clock;
 pub mod engine;
 mod error;
 mod field;
+mod folds;
 #[cfg(target_family = "wasm")]
 mod gpu;
 mod incoming;
@@ -43,8 +44,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, BoundArrays, BuiltSample, CageArrays, CageControls, CageOptions, CageState, Command,
-  Coordinates, Frames, Gesture, GizmoPart, GrabInput, GrabResult, Legend, ModelFormat, ModelInfo, Offsets, OpenContents,
-  Problem, Progress, PullFrame, Repair, RigArrays, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
+  Coordinates, FoldArrays, Frames, Gesture, GizmoPart, GrabInput, GrabResult, HumanoidInfo, Legend, ModelFormat, ModelInfo, Offsets, OpenContents,
+  Problem, Progress, ProportionRange, PullFrame, Repair, RigArrays, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
   View } from "../contract/generated";
 
 /** Column indices and weights from `start` to `end` of sparse rows. */

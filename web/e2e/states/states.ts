@@ -9,6 +9,7 @@ import type {
   BindOptions,
   BindReport,
   CageState,
+  HumanoidInfo,
   InnerElement,
   ModelInfo,
   Problem,
@@ -81,6 +82,13 @@ const INNER_ELEMENTS: readonly InnerElement[] = [
   { face: [3, 4, 5] },
   { point: 6 },
 ];
+const BONES = Object.keys(T.proportions.bone) as HumanoidInfo["bones"][number]["bone"][];
+const HUMANOID: HumanoidInfo = {
+  source: "names",
+  fault: null,
+  bones: BONES.map((bone) => ({ bone, joint: "1", given: false })),
+  joints: ["1", "2"],
+};
 const CAGE_WITH_CONTROLS: CageState = {
   ...CAGE,
   controls: { smooth: 2, inner: 7, elements: [...INNER_ELEMENTS], radius: null },
@@ -165,6 +173,11 @@ const full = (): Record<AppState["step"], Patch> => ({
     shares: [0.5],
     clip: { ...INITIAL_STATE.clip, clip: 0 },
     scene: { ...INITIAL_STATE.scene, slice: "value", colour: "weight" },
+    humanoid: HUMANOID,
+    factors: { left_leg: 2, right_leg: 2 },
+    folds: [{ proportion: "leg", min: 0.5, max: 1.5 }],
+    scaled: true,
+    apart: true,
     seeOpen: true,
     legend: { low: 0, high: 1, logarithmic: false, map: "viridis", largest: null },
   },
@@ -247,6 +260,11 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
   ],
   pose: [
     {},
+    ...of("humanoid", [
+      { ...HUMANOID, source: "vrm" },
+      { ...HUMANOID, source: "shape" },
+      { ...HUMANOID, source: null, fault: "1." },
+    ]),
     { bound: false, report: null },
     { selected: selected(1, 1), pins: [{ triangle: 0, bary: [1, 0, 0] }], pullWhole: true },
     { selected: selected(1, 81), cage: CAGE_WITH_CONTROLS },

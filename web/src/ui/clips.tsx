@@ -1,6 +1,7 @@
 /** Clips and morph targets of a rigged model, and the options of its skeleton. */
 
 import type { App } from "../app";
+import { rigOf } from "../derived";
 import { duration, percent } from "../format";
 import { T } from "../words";
 import { Fold, fieldsOf, IconButton, Segments, Select, SHARES, Slider, switchOf, Toggle } from "./controls";
@@ -101,7 +102,12 @@ export function RigChoices({ app }: { app: App }) {
       <Toggle label={T.clips.follow} sentence={T.clips.followSentence} {...follow} />
       {joints !== "stay" && (
         <>
-          <Toggle label={T.clips.ground} sentence={T.clips.groundSentence} {...option("ground")} />
+          <Toggle
+            label={T.clips.ground}
+            sentence={T.clips.groundSentence}
+            value={rigOf(app.store.get()).ground}
+            onChange={(ground) => void app.clips.rig({ ground, ground_off: !ground })}
+          />
           <Toggle label={T.clips.feet} sentence={T.clips.feetSentence} {...feet} />
           {model.props.length > 0 && (
             <Fold title={T.clips.rigid(rigid.length, model.props.length)}>

@@ -213,6 +213,12 @@ interface SliderProps extends Field<number> {
   /** Formats the value for the display and for screen readers. */
   format?: (value: number) => string;
   name?: string;
+  /** Values that a band below the slider marks as usual. */
+  usual?: readonly [from: number, to: number];
+  /** Values beyond which the band marks that something is wrong. */
+  limits?: { readonly min: number; readonly max: number };
+  /** Called on a double click. */
+  onReset?: () => void;
 }
 
 /** Range and format of a slider for a fraction, 0 to 1, shown in percent. */
@@ -220,11 +226,19 @@ export const SHARES = { min: 0, max: 1, step: 0.01, format: percent } as const;
 
 /** A slider with its value next to the label. */
 export function Slider(props: SliderProps) {
-  const { label, value, onChange, onCommit, format = String, name, ...range } = props;
+  const { label, value, onChange, onCommit, format = String, name, usual, limits, onReset, ...range } = props;
   const id = useUid();
+  const band = usual && {
+    "--min": range.min,
+    "--max": range.max,
+    "--from": usual[0],
+    "--to": usual[1],
+    "--low": limits?.min ?? range.min,
+    "--high": limits?.max ?? range.max,
+  };
   return (
-    <div class="field">
-      <label for={id}>
+    <div class={usual ? "field banded" : "field"} style={band}>
+      <label for={id} onDblClick={onReset}>
         {label}
         <output for={id}>{format(value)}</output>
       </label>
@@ -235,6 +249,7 @@ export function Slider(props: SliderProps) {
         value={value}
         aria-label={name}
         aria-valuetext={format(value)}
+        onDblClick={onReset}
         onInput={(event) => onChange(event.currentTarget.valueAsNumber)}
         onChange={(event) => onCommit?.(event.currentTarget.valueAsNumber)}
       />

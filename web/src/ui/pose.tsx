@@ -24,6 +24,7 @@ import {
   Toggle,
 } from "./controls";
 import { Icon } from "./icons";
+import { Proportions } from "./proportions";
 import { useTouch } from "./touch";
 
 const INTERPOLATIONS = ["step", "linear", "cubic"] as const satisfies readonly Interpolation[];
@@ -33,6 +34,7 @@ export function PosePanel({ app }: { app: App }) {
   return (
     <div class="stack loose">
       <Head title={T.pose.title} sentence={T.pose.sentence} />
+      <Proportions app={app} />
       <Section title={T.pose.poses}>
         <Poses app={app} />
       </Section>

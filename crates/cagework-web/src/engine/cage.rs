@@ -46,8 +46,9 @@ impl Engine {
     ) -> Answer<JsValue> {
         let cage: CageArrays = decode(cage)?;
         let (mesh, is_step) = (cage.mesh()?, label.is_some());
-        let CageArrays { controls, notices, .. } = cage;
-        self.step(Command::ReplaceCage { mesh, controls, notices }, label)?;
+        let CageArrays { controls, notices, rings, .. } = cage;
+        let rings = rings.map_or_else(Vec::new, |rings| rings.loops().into_values().collect());
+        self.step(Command::ReplaceCage { mesh, controls, notices, rings }, label)?;
         if !is_step {
             self.change(|state| state.editor.amend());
         }

@@ -11,6 +11,7 @@ mod gesture;
 mod models;
 mod picture;
 mod play;
+mod proportions;
 mod pull;
 mod rest;
 mod scene;

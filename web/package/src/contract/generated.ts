@@ -13,7 +13,7 @@ export type BindOptions = {
  */
 backend: Backend,
 /**
- * Cells along the longest side of the cage's box, 8 to 512; with the classic method, along each side.
+ * Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
  * [`AUTO_GRID`] (0, or "auto" in JSON that is read) chooses the number for the cage. Default 0.
  */
 grid: number,
@@ -26,13 +26,25 @@ method: Method,
  */
 solver: Solver,
 /**
+ * Preconditioner of conjugate gradients. Default none.
+ */
+preconditioner: Preconditioner,
+/**
+ * Cell shape of the classic method. Default box.
+ */
+cell_shape: CellShape,
+/**
+ * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
+ */
+delta_norm: DeltaNorm,
+/**
  * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
  * of the other solvers. Default 1e-5.
  */
 tau: number,
 /**
- * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles also
- * stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles, and steps with a V-cycle in each,
+ * also stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
  */
 max_iterations: number,
 /**
@@ -62,6 +74,10 @@ method: Method,
  */
 solver: Solver,
 /**
+ * Preconditioner of conjugate gradients.
+ */
+preconditioner: Preconditioner,
+/**
  * Processor that computed the bind.
  */
 backend: Backend,
@@ -89,6 +105,14 @@ dims: [number, number, number],
  * Edge lengths of a cell, object units.
  */
 cell_size: [number, number, number],
+/**
+ * Shape of the cells: rectangular (K. Smith) or cubic.
+ */
+cell_shape: CellShape,
+/**
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2; `docs/method.md`, sources).
+ */
+delta_norm: DeltaNorm,
 /**
  * Convergence threshold for delta, the last value of `delta_history`.
  */
@@ -187,6 +211,30 @@ ambiguous_cells: number,
  * Notices in whole sentences, for example about flipped faces or unused vertices.
  */
 notices: Array<string>, };
+/**
+ * A humanoid bone. The names are those of VRM 1.0.
+ */
+export type Bone = "hips" | "spine" | "chest" | "upperChest" | "neck" | "head" | "leftShoulder" | "rightShoulder" | "leftUpperArm" | "rightUpperArm" | "leftLowerArm" | "rightLowerArm" | "leftHand" | "rightHand" | "leftUpperLeg" | "rightUpperLeg" | "leftLowerLeg" | "rightLowerLeg" | "leftFoot" | "rightFoot" | "leftToes" | "rightToes";
+/**
+ * What told which joint is which bone.
+ */
+export type BoneSource = "vrm" | "names" | "shape";
+/**
+ * A humanoid bone, as panels show it.
+ */
+export type BoneView = {
+/**
+ * The bone.
+ */
+bone: Bone,
+/**
+ * Name of its joint, if it has one.
+ */
+joint: string | null,
+/**
+ * Whether the user has chosen the joint.
+ */
+given: boolean, };
 /**
  * Weights as compressed sparse rows. `offsets` describes the columns after the columns of the controls.
  */
@@ -287,7 +335,11 @@ elements: Array<InnerElement>,
 /**
  * Radius of points and lines, object units; null for 1/32 of the cage's longest side.
  */
-radius: number | null, };
+radius: number | null,
+/**
+ * Loops of cage vertices around limbs, of a generated cage.
+ */
+rings?: Array<Array<number>>, };
 /**
  * Counts, bounds and notices of the cage.
  */
@@ -297,11 +349,11 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
  */
 quads: number, bounds: Bounds, notices: Array<string>, };
 /**
- * Kind of a generated cage.
+ * Kind of a generated cage. Serde aliases are names in older project files.
  */
 export type CageKind = "auto" | "skeleton" | "shell" | "hull";
 /**
- * Options of [`super::generate`].
+ * Options of [`super::generate`]. Serde aliases are names in older project files.
  */
 export type CageOptions = {
 /**
@@ -387,6 +439,10 @@ boundary: number,
  */
 exterior: number, };
 /**
+ * Cell shape of the classic method.
+ */
+export type CellShape = "box" | "cubic";
+/**
  * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
 export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "t_junction" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
@@ -405,7 +461,27 @@ export type Command = { "do": "set_pose",
 /**
  * Positions of cage vertices, then of inner controls, object units. `[n_controls]`
  */
-positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
+positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "set_proportion",
+/**
+ * Name of the proportion, such as "leg" for both sides or "left_leg" for one.
+ */
+name: string,
+/**
+ * Factor, 0.5 to 2; 1 keeps the length at rest.
+ */
+factor: number, } | { "do": "set_preset",
+/**
+ * Name of the preset; null sets all factors to 1.
+ */
+name: string | null, } | { "do": "mirror_proportions" } | { "do": "set_bone",
+/**
+ * The bone.
+ */
+bone: Bone,
+/**
+ * Name of the joint; null takes the joint that the file's data, names or shape tell.
+ */
+joint: string | null, } | { "do": "save_pose",
 /**
  * Name of the new saved pose.
  */
@@ -485,7 +561,11 @@ positions: readonly (readonly [number, number, number])[],
 /**
  * Shares of the saved poses in the current pose.
  */
-shares: Array<number>, } | { "do": "set_pins",
+shares: Array<number>,
+/**
+ * Factors of the proportions that the current pose contains.
+ */
+proportions?: Readonly<Record<string, number>>, } | { "do": "set_pins",
 /**
  * Points on the surfaces of the models.
  */
@@ -501,7 +581,11 @@ controls: CageControls | null,
 /**
  * Notices of the cage generator about the new cage.
  */
-notices: Array<string>, } | { "do": "move_rest" } | { "do": "edit_rest",
+notices: Array<string>,
+/**
+ * Loops of vertices around the limbs of a generated cage.
+ */
+rings?: Array<Array<number>>, } | { "do": "move_rest" } | { "do": "edit_rest",
 /**
  * What to do with the selected elements.
  */
@@ -559,9 +643,17 @@ id: number,
  */
 amounts: Array<number>, };
 /**
+ * Compression of a GLB.
+ */
+export type Compression = "none" | "meshopt";
+/**
  * Kind of coordinates.
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
+/**
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
+ */
+export type DeltaNorm = "euclidean" | "literal";
 /**
  * Options of a drag.
  */
@@ -602,6 +694,26 @@ repair: Repair, } | { "kind": "grid",
  * Number of cells that resolves all parts of the cage.
  */
 cells: number, };
+/**
+ * A part of a bound humanoid.
+ */
+export type FoldArrays = {
+/**
+ * The cage with the bones.
+ */
+cage: unknown,
+/**
+ * Weights of the vertices.
+ */
+weights: BoundArrays,
+/**
+ * Vertices at rest. `[n_vertices, 3]`
+ */
+positions: Float32Array,
+/**
+ * `[n_triangles, 3]`
+ */
+triangles: Uint32Array, };
 /**
  * Columns of a bind's weights that follow those of its controls.
  */
@@ -698,6 +810,26 @@ stays: Float32Array,
  * the pull moves the whole model.
  */
 reach: number, };
+/**
+ * Humanoid bones of the models, for panels.
+ */
+export type HumanoidInfo = {
+/**
+ * What told which joint is which bone; null if the skeleton is not that of a humanoid.
+ */
+source: BoneSource | null,
+/**
+ * Why the skeleton is not that of a humanoid, one sentence.
+ */
+fault: string | null,
+/**
+ * Bones in the order of [`Bone`]. Without a source, only the missing bones and those that the user has given.
+ */
+bones: Array<BoneView>,
+/**
+ * Distinct names of the joints.
+ */
+joints: Array<string>, };
 /**
  * An element of inner controls: indices into [`InnerControls::positions`].
  */
@@ -941,6 +1073,10 @@ interpolation: Interpolation | null,
  */
 hash: number, };
 /**
+ * Preconditioner of conjugate gradients.
+ */
+export type Preconditioner = "none" | "v_cycle";
+/**
  * All occurrences of one kind of problem.
  */
 export type Problem = {
@@ -989,6 +1125,26 @@ iteration: number,
  * has none.
  */
 delta: number | null, };
+/**
+ * A proportion of a humanoid.
+ */
+export type Proportion = "leg" | "arm" | "torso" | "neck" | "head" | "hand" | "foot" | "shoulder" | "hip" | "limb" | "waist" | "height";
+/**
+ * Factors of a proportion between which no part of the model folds.
+ */
+export type ProportionRange = {
+/**
+ * The proportion.
+ */
+proportion: Proportion,
+/**
+ * Least factor.
+ */
+min: number,
+/**
+ * Greatest factor.
+ */
+max: number, };
 /**
  * One frame of a pull.
  */
@@ -1096,6 +1252,10 @@ plain: boolean,
  */
 dynamic: boolean,
 /**
+ * Whether the user has switched `ground` off, so that changed proportions do not switch it on.
+ */
+ground_off: boolean,
+/**
  * How the skeleton follows the cage.
  */
 joints: Joints,
@@ -1118,7 +1278,15 @@ feet: Feet,
 /**
  * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
  */
-expressions: boolean, };
+expressions: boolean,
+/**
+ * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
+ */
+quantize: boolean,
+/**
+ * Compression of the buffers.
+ */
+compress: Compression, };
 /**
  * Place of a cage vertex in a ring.
  */
@@ -1390,6 +1558,18 @@ pins: Array<SurfacePoint>,
  */
 posed: boolean,
 /**
+ * Factors of the humanoid's proportions, each side of those with two sides alone, such as "left_leg".
+ */
+factors: Readonly<Record<string, number>>,
+/**
+ * Name of the preset that the factors are, if they are one.
+ */
+preset: string | null,
+/**
+ * Whether a factor differs from 1. An export then keeps the ground, unless the user has switched that off.
+ */
+scaled: boolean,
+/**
  * Whether the cage is being reshaped.
  */
 editingRest: boolean,
@@ -1449,10 +1629,10 @@ max_sum_error: number,
  * Number of stored weights.
  */
 nonzeros: number, };
-export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
+export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"plain":false,"dynamic":false};
-export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false,"ground_off":false};
+export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":{},"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
@@ -1470,9 +1650,13 @@ export const SPLAT_FORMATS = ["ply", "splat", "spz"] as const;
 /** MIME types of exported models, by extension. */
 export const EXPORT_TYPES: Readonly<Record<string, string>> = { "glb": "model/gltf-binary", "vrm": "model/gltf-binary", "gltf": "model/gltf-binary", "obj": "model/obj", "stl": "model/stl", "3mf": "model/3mf", };
 /** Sliders of options, by name. */
-export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, target: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, clearance: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, } as const;
+export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, target: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, clearance: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, factor: {"min":0.5,"max":2.0,"step":0.01}, } as const;
 export const BOX_DIVISIONS = 2;
 export const HULL_TARGET = 24;
+/** Proportions of a humanoid, in the order of their sliders. */
+export const PROPORTIONS = [{"name":"leg","group":"Limbs","sided":true,"natural":[0.6,1.4]},{"name":"arm","group":"Limbs","sided":true,"natural":[0.7,1.3]},{"name":"torso","group":"Trunk","sided":false,"natural":[0.75,1.3]},{"name":"neck","group":"Head and height","sided":false,"natural":[0.5,2.0]},{"name":"head","group":"Head and height","sided":false,"natural":[0.8,1.8]},{"name":"hand","group":"Limbs","sided":true,"natural":[0.7,1.4]},{"name":"foot","group":"Limbs","sided":true,"natural":[0.7,1.4]},{"name":"shoulder","group":"Trunk","sided":false,"natural":[0.8,1.3]},{"name":"hip","group":"Trunk","sided":false,"natural":[0.85,1.2]},{"name":"limb","group":"Limbs","sided":true,"natural":[0.75,1.4]},{"name":"waist","group":"Trunk","sided":false,"natural":[0.75,1.4]},{"name":"height","group":"Head and height","sided":false,"natural":[0.5,2.0]}] as const;
+/** Presets of proportions. */
+export const PRESETS = ["longer legs", "big head", "hero", "chibi", "slim", "stout"] as const;
 /** Maximum length of a picture's longer side, pixels. */
 export const MAX_PICTURE = 8192;
 /** Default solver of each method. */

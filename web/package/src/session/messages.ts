@@ -8,12 +8,14 @@ import type {
   CageOptions,
   CheckedCage,
   Coordinates,
+  FoldArrays,
   GrabInput,
   GrabResult,
   NamedFile,
   PoseArrays,
   Problem,
   Progress,
+  ProportionRange,
   PullFrame,
   Reading,
   Repair,
@@ -176,6 +178,8 @@ export interface Jobs {
     step: never;
     output: null;
   };
+  /** Factors of proportions within which the model does not fold. */
+  folds: { input: FoldArrays; step: never; output: readonly ProportionRange[] };
   pullGrab: { input: GrabInput; step: never; output: GrabResult };
   pullFrame: { input: { to: Float32Array }; step: never; output: PullFrame };
   /** Builds a sample. `name`: file name of its model, with the extension .glb. */

@@ -172,6 +172,7 @@ function createWork(pkg: Package): Work {
     repair: async ({ kind, cage, model }) =>
       checked(pkg, pkg.Binder.repairCage(kind, model, cage), model, cage.controls?.smooth),
     carry: async ({ model, cage, old, poses }) => pkg.Binder.carryPoses(model, cage, old, poses),
+    folds: async (sample) => pkg.Binder.proportionRanges(sample),
     async pullOpen({ positions, triangles, cage }) {
       puller?.free();
       puller = undefined;

@@ -28,6 +28,7 @@ export const failed = {
   edit: (what: string) => `${what}: not possible here`,
   write: "The file could not be written",
   time: "The time was not changed",
+  bone: "The bone was not changed",
   delete: "The kept work could not be deleted",
   sample: "The sample could not be opened",
   open: (name: string) => `${name} could not be opened`,

@@ -9,6 +9,7 @@ import { exports } from "./exports";
 import { model, opening, samples } from "./model";
 import { models } from "./models";
 import { did, gesture, pose, pull } from "./pose";
+import { proportions } from "./proportions";
 import { legend, see } from "./see";
 import { eta, hints, keys, status, toast, view } from "./view";
 import { without } from "./without";
@@ -44,6 +45,7 @@ const words = {
   clips,
   pose,
   pull,
+  proportions,
   did,
   gesture,
   exports,

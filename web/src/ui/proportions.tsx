@@ -1,0 +1,140 @@
+/** The section Proportions of step Pose: sliders for the parts of a humanoid, presets, and the bones that were found. */
+
+import { useEffect } from "preact/hooks";
+import type { App } from "../app";
+import type { HumanoidInfo } from "../contract";
+import { PRESETS, PROPORTIONS, SLIDERS } from "../defaults";
+import { list, percent } from "../format";
+import { T } from "../words";
+import { Button, Fold, Say, Section, Select, Slider, Toggle } from "./controls";
+
+type Facts = (typeof PROPORTIONS)[number];
+
+const GROUPS = Object.keys(T.proportions.groups) as Facts["group"][];
+const RANGE = { ...SLIDERS.factor, format: (factor: number) => percent(factor, 0, SLIDERS.factor.max) };
+
+export function Proportions({ app }: { app: App }) {
+  const { humanoid, cage } = app.store.get();
+  if (!humanoid || !cage) return null;
+  if (!humanoid.source)
+    return (
+      <Fold title={T.proportions.unknown}>
+        {humanoid.fault && <Say text={{ english: humanoid.fault }} kind="hint" />}
+        <Bones app={app} humanoid={humanoid} />
+      </Fold>
+    );
+  return (
+    <Section title={T.proportions.title}>
+      <Presets app={app} />
+      <Sliders app={app} />
+      <Fold title={T.proportions.bones}>
+        <p class="hint">{T.proportions.sources[humanoid.source]}</p>
+        <Bones app={app} humanoid={humanoid} />
+      </Fold>
+    </Section>
+  );
+}
+
+function Presets({ app }: { app: App }) {
+  const { preset } = app.store.get();
+  return (
+    <div class="row wrap">
+      {PRESETS.map((name) => (
+        <Button
+          key={name}
+          label={T.proportions.presets[name]}
+          pressed={preset === name}
+          onClick={() => app.proportions.preset(name)}
+        />
+      ))}
+    </div>
+  );
+}
+
+/** A slider: the name of its proportion in commands, the name in `AppState.factors`, and the title. */
+type Entry = readonly [name: string, factor: string, title: string];
+
+function Sliders({ app }: { app: App }) {
+  const { factors, folds, bound, bindRun, apart, scaled } = app.store.get();
+  useEffect(() => void app.proportions.measure(), [bound, bindRun, folds]);
+  const titles = T.proportions.titles;
+  const isApart =
+    apart || PROPORTIONS.some(({ name }) => factors[`left_${name}`] !== factors[`right_${name}`]);
+  const entries = ({ name, sided }: Facts): readonly Entry[] => {
+    const [left, right] = [`left_${name}`, `right_${name}`];
+    if (!sided) return [[name, name, titles[name]]];
+    if (!isApart) return [[name, left, titles[name]]];
+    return [
+      [left, left, T.proportions.left(titles[name])],
+      [right, right, T.proportions.right(titles[name])],
+    ];
+  };
+  const rangeOf = (facts: Facts) =>
+    folds?.find(({ proportion }) => proportion === facts.name) ?? SLIDERS.factor;
+  const folded = PROPORTIONS.flatMap((facts) => {
+    const { min, max } = rangeOf(facts);
+    return entries(facts).filter(
+      ([, factor]) => (factors[factor] ?? 1) < min || (factors[factor] ?? 1) > max,
+    );
+  });
+  return (
+    <>
+      {GROUPS.map((group) => (
+        <fieldset class="field sliders" key={group}>
+          <legend class="legend-text">{T.proportions.groups[group]}</legend>
+          {PROPORTIONS.filter((facts) => facts.group === group).map((facts) =>
+            entries(facts).map(([name, factor, title]) => (
+              <Slider
+                key={name}
+                label={title}
+                {...RANGE}
+                usual={facts.natural}
+                limits={rangeOf(facts)}
+                value={factors[factor] ?? 1}
+                onChange={(value) => app.proportions.set(name, value)}
+                onCommit={() => app.proportions.commit(title)}
+                onReset={() => {
+                  app.proportions.set(name, 1);
+                  app.proportions.commit(title);
+                }}
+              />
+            )),
+          )}
+        </fieldset>
+      ))}
+      {folded.length > 0 && (
+        <p class="hint warn-text">{T.proportions.folds(list(folded.map(([, , title]) => title)))}</p>
+      )}
+      <div class="row">
+        <div class="grow">
+          <Toggle label={T.proportions.apart} value={isApart} onChange={app.proportions.apart} />
+        </div>
+        <Button
+          label={T.proportions.resetAll}
+          icon="reset"
+          tip={T.proportions.resetTip}
+          disabled={!scaled}
+          onClick={() => app.proportions.preset(null)}
+        />
+      </div>
+    </>
+  );
+}
+
+function Bones({ app, humanoid }: { app: App; humanoid: HumanoidInfo }) {
+  return (
+    <>
+      {humanoid.bones.map(({ bone, joint }) => (
+        <Select
+          key={bone}
+          label={T.proportions.bone[bone]}
+          kind="row"
+          none={T.proportions.automatic}
+          options={humanoid.joints.map((name) => [name, name])}
+          value={joint}
+          onChange={(name) => app.proportions.bone(bone, name)}
+        />
+      ))}
+    </>
+  );
+}
