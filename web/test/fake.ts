@@ -244,6 +244,7 @@ export function createFake(): Fake {
     },
     undo: () => false,
     modelInfo: () => model,
+    humanoidInfo: () => undefined,
     cageState: () => (rest.positions.length > 0 ? stateOf() : undefined),
     boundReport: () => undefined,
     carriable: () => posed.slice(),

@@ -24,7 +24,9 @@ use crate::error::EditError;
 /// coordinates: a few roundings of 32-bit numbers.
 const ROUNDING: f64 = 1e-6;
 /// Maximum number of triangles in which folds are looked for. Larger models are sampled.
-const MAX_FOLD_TRIANGLES: usize = 10_000;
+const MAX_FOLD_TRIANGLES: usize = 8_000;
+/// Number of consecutive triangles that a sample takes together, because they share most of their vertices.
+const FOLD_RUN: usize = 32;
 
 /// Bones and the names of their joints that the user has given.
 pub(crate) type GivenBones = Arc<Vec<(Bone, String)>>;
@@ -273,7 +275,7 @@ pub struct FoldSample {
     pub frames: Arc<Frames>,
     /// Vertices at rest, object units.
     pub positions: Vec<Vec3>,
-    /// Triangles of these vertices, at most 10,000.
+    /// Triangles of these vertices, at most 8,000.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -294,7 +296,8 @@ impl BoundDocument<'_> {
                 vertices.len() as u32 - 1
             })
         };
-        let triangles = models.triangles().iter().step_by(step).map(|t| t.map(&mut own)).collect();
+        let runs = models.triangles().chunks(FOLD_RUN).step_by(step);
+        let triangles = runs.flatten().map(|t| t.map(&mut own)).collect();
         let positions = vertices.iter().map(|&v| models.positions()[v as usize]).collect();
         let (weights, frames) = (bound.weights.with_rows(&vertices), Arc::clone(&bound.frames));
         Ok(FoldSample { cage, weights, frames, positions, triangles })

@@ -128,7 +128,7 @@ function Bones({ app, humanoid }: { app: App; humanoid: HumanoidInfo }) {
         <Select
           key={bone}
           label={T.proportions.bone[bone]}
-          kind="row"
+          kind="bone"
           none={T.proportions.automatic}
           options={humanoid.joints.map((name) => [name, name])}
           value={joint}
