@@ -357,6 +357,8 @@ pub struct HumanoidCage {
     frame: Frame,
     /// Height of the chin above the middle of the hip joints.
     chin: f64,
+    /// Left out where ranges are measured.
+    #[serde(skip)]
     ends: Option<EndFit>,
 }
 
