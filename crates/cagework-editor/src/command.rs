@@ -5,6 +5,7 @@ use std::sync::Arc;
 use cagework_core::{InnerElement, PolygonMesh};
 use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, TimelineError, check_times};
 use cagework_pose::blend::reblend;
+#[cfg(feature = "typescript")]
 use cagework_pose::humanoid::Bone;
 use cagework_pose::proportions::Proportions;
 use glam::Vec3;
@@ -71,8 +72,9 @@ pub enum Command {
     MirrorProportions,
     /// Names the joint of a humanoid bone.
     SetBone {
-        /// The bone.
-        bone: Bone,
+        /// Name of the bone.
+        #[cfg_attr(feature = "typescript", ts(as = "Bone"))]
+        bone: String,
         /// Name of the joint; null takes the joint that the file's data, names or shape tell.
         joint: Option<String>,
     },
@@ -157,10 +159,6 @@ pub enum Command {
         positions: Vec<Vec3>,
         /// Shares of the saved poses in the current pose.
         shares: Vec<f32>,
-        /// Factors of the proportions that the current pose contains.
-        #[serde(default)]
-        #[cfg_attr(feature = "typescript", ts(optional, type = "Readonly<Record<string, number>>"))]
-        proportions: Proportions,
     },
     /// Sets the surface points that pulls keep in place.
     SetPins {
@@ -262,7 +260,7 @@ impl Editor {
             Command::SetPreset { name: Some(name) } => self.set_preset(&name)?,
             Command::SetPreset { name: None } => self.set_proportions(Proportions::default())?,
             Command::MirrorProportions => self.mirror_proportions()?,
-            Command::SetBone { bone, joint } => self.set_bone(bone, joint)?,
+            Command::SetBone { bone, joint } => self.set_bone(bone.parse()?, joint)?,
             Command::SavePose { name } => {
                 let pose = self.document().pose.clone();
                 let pins = Some(self.document().pins.clone());
@@ -341,9 +339,8 @@ impl Editor {
                 self.document_mut().transition = transition.within_limits();
             }
             Command::Blend { index, share } => self.blend(index, share)?,
-            Command::CarryPoses { from, positions, shares, proportions } => {
+            Command::CarryPoses { from, positions, shares } => {
                 self.take_carried(from, &positions, &shares)?;
-                self.document_mut().proportions = proportions;
             }
             Command::SetPins { pins } => self.document_mut().pins = pins.into(),
             Command::ReplaceCage { mesh, controls, notices, rings } => {
@@ -533,7 +530,9 @@ impl Editor {
         let mut carried = positions.chunks_exact(n.max(1));
         let pose = carried.next().map(<[Vec3]>::to_vec).unwrap_or_default();
         self.set_pose(pose)?;
+        let proportions = self.proportions_with(from);
         let document = self.document_mut();
+        document.proportions = proportions;
         let cage = Some(document.cage_id);
         for pose in Arc::make_mut(&mut document.poses).iter_mut().filter(|pose| pose.cage == Some(from)) {
             if let Some(carried) = carried.next() {

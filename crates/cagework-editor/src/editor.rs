@@ -52,6 +52,8 @@ pub struct Editor {
     pub hovered: Vec<u32>,
     tools: Tools,
     humanoid: HumanoidCache,
+    /// Identifier of the last cage that was replaced, and the factors of the proportions that its pose contained.
+    replaced: (u32, Proportions),
 }
 
 /// Contents that are opened together with models.
@@ -247,6 +249,7 @@ impl Editor {
 
     /// Replaces the cage at rest, resets the pose to it, and sets the shares of all saved poses to 0.
     pub(crate) fn set_cage(&mut self, cage: RestCage) {
+        self.replaced = (self.document.cage_id, self.document.proportions);
         self.document.cage_key = self.next_key();
         self.document.cage_id = cage_id(&cage.mesh);
         self.document.pose = cage.mesh.positions.as_slice().into();
@@ -412,6 +415,11 @@ impl Editor {
         self.document.pose = pose;
     }
 
+    /// Factors of the proportions that the pose of the cage `id` contained when it was replaced.
+    pub(crate) fn proportions_with(&self, id: u32) -> Proportions {
+        if self.replaced.0 == id { self.replaced.1 } else { Proportions::default() }
+    }
+
     /// Humanoid bones of the models, for panels; `None` if the models have no skeleton.
     pub fn humanoid_info(&mut self) -> Option<HumanoidInfo> {
         self.humanoid.info(&self.document)
@@ -575,7 +583,7 @@ impl Editor {
             animation_seconds: self.document.timeline().seconds(),
             pins: pins.to_vec(),
             posed: !self.editing_rest && self.document.is_posed(),
-            factors: self.document.all_factors(),
+            factors: self.document.factors(),
             preset: self.document.preset().map(str::to_owned),
             scaled: self.document.proportions != Proportions::default(),
             editing_rest: self.editing_rest,

@@ -1,5 +1,6 @@
 //! Errors of commands. The document is unchanged after an error.
 
+use cagework_core::options::UnknownWord;
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, WriteError};
 use cagework_pose::blend::VertexCountError;
@@ -80,6 +81,9 @@ pub enum EditError {
     /// A name selects no part of the model.
     #[error(transparent)]
     Part(#[from] SelectError),
+    /// There is no such bone.
+    #[error(transparent)]
+    Bone(#[from] UnknownWord),
     /// The models are not a humanoid.
     #[error(transparent)]
     Humanoid(#[from] HumanoidError),

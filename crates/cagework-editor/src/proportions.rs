@@ -3,7 +3,6 @@
 //! A change of the factors displaces the pose by the difference of two cages at rest: the one with the new factors minus
 //! the one with the old factors. So pulled vertices keep their displacement, and factors of 1 give the pulled pose.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cagework_core::options::Choice;
@@ -50,8 +49,9 @@ pub struct HumanoidInfo {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BoneView {
-    /// The bone.
-    pub bone: Bone,
+    /// Name of the bone.
+    #[cfg_attr(feature = "typescript", ts(as = "Bone"))]
+    pub bone: String,
     /// Name of its joint, if it has one.
     pub joint: Option<String>,
     /// Whether the user has chosen the joint.
@@ -125,7 +125,7 @@ impl HumanoidInfo {
             Err(_) => given.iter().any(|(own, _)| own == bone),
         };
         let bones = Bone::ALL.iter().map(|(_, bone)| *bone).filter(is_shown).map(|bone| BoneView {
-            bone,
+            bone: bone.to_string(),
             joint: joint_of(bone),
             given: given.iter().any(|(own, _)| *own == bone),
         });
@@ -229,15 +229,10 @@ impl Document {
         self.pose.iter().zip(rest).zip(&scaled).map(own).collect()
     }
 
-    /// Names and factors of all proportions, each side of those with two sides alone: "left_leg", "right_leg", "head".
-    pub(crate) fn all_factors(&self) -> BTreeMap<String, f64> {
-        let of = |&(name, proportion): &(&str, Proportion)| {
-            let factor = |side| self.proportions.factor(proportion, side);
-            if proportion.facts().is_sided {
-                vec![(format!("left_{name}"), factor(0)), (format!("right_{name}"), factor(1))]
-            } else {
-                vec![(name.to_owned(), factor(0))]
-            }
+    /// Factors of all proportions, on the left and on the right. `[n_proportions, 2]`
+    pub(crate) fn factors(&self) -> Vec<f64> {
+        let of = |(_, proportion): &(&str, Proportion)| {
+            [0, 1].map(|side| self.proportions.factor(*proportion, side))
         };
         Proportion::ALL.iter().flat_map(of).collect()
     }
@@ -265,10 +260,8 @@ fn with_proportions(
     own.iter().zip(rest).zip(cage.pose(factors)).map(at).collect()
 }
 
-/// A part of a bound model, in which the ranges of the proportions without folds are measured.
+/// A part of a bound humanoid, in which the ranges of the proportions without folds are measured.
 pub struct FoldSample {
-    /// The cage with the bones.
-    pub cage: Arc<HumanoidCage>,
     /// Weights of the vertices.
     pub weights: Weights,
     /// Frames of the weights.
@@ -280,11 +273,11 @@ pub struct FoldSample {
 }
 
 impl BoundDocument<'_> {
-    /// Takes triangles of the models, for [`HumanoidCage::ranges`]. `cage`: from [`Editor::humanoid_cage`].
+    /// Takes triangles of the models, for [`HumanoidCage::ranges`].
     ///
     /// # Errors
     /// Before a bind.
-    pub fn fold_sample(&self, cage: Arc<HumanoidCage>) -> Result<FoldSample, BoundError> {
+    pub fn fold_sample(&self) -> Result<FoldSample, BoundError> {
         let bound = self.require_bound()?;
         let models = &self.document().models;
         let step = models.triangles().len().div_ceil(MAX_FOLD_TRIANGLES).max(1);
@@ -300,6 +293,6 @@ impl BoundDocument<'_> {
         let triangles = runs.flatten().map(|t| t.map(&mut own)).collect();
         let positions = vertices.iter().map(|&v| models.positions()[v as usize]).collect();
         let (weights, frames) = (bound.weights.with_rows(&vertices), Arc::clone(&bound.frames));
-        Ok(FoldSample { cage, weights, frames, positions, triangles })
+        Ok(FoldSample { weights, frames, positions, triangles })
     }
 }

@@ -39,7 +39,7 @@ pub struct DocumentSettings {
     pub pose_proportions: Vec<Proportions>,
     /// Humanoid bones, and the names of the joints that the user has given them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub bones: Vec<(Bone, String)>,
+    pub bones: Vec<(String, String)>,
     /// Pinned surface points, which stay in place when the user pulls others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
@@ -93,7 +93,11 @@ impl DocumentSettings {
             } else {
                 Vec::new()
             },
-            bones: models.given_bones().to_vec(),
+            bones: models
+                .given_bones()
+                .iter()
+                .map(|(bone, joint)| (bone.to_string(), joint.clone()))
+                .collect(),
             pins: pins.to_vec(),
             pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
             pose_fits: if has_misfit {
@@ -151,6 +155,12 @@ impl DocumentSettings {
             }
             None => (with(CageControls::default()).ok(), None),
         }
+    }
+
+    /// Humanoid bones, and the names of the joints that the user has given them. Skips unknown bones.
+    #[must_use]
+    pub fn given_bones(&self) -> Vec<(Bone, String)> {
+        self.bones.iter().filter_map(|(bone, joint)| Some((bone.parse().ok()?, joint.clone()))).collect()
     }
 
     /// Saved poses with their pins and times. `cage`: the cage of the project.

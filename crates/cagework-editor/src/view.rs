@@ -1,7 +1,5 @@
 //! The part of a document that panels show.
 
-use std::collections::BTreeMap;
-
 use cagework_io::Interpolation;
 use serde::Serialize;
 
@@ -34,9 +32,8 @@ pub struct DocumentView {
     pub pins: Vec<SurfacePoint>,
     /// Whether the pose differs from the cage at rest; false while the cage is being reshaped.
     pub posed: bool,
-    /// Factors of the humanoid's proportions, each side of those with two sides alone, such as "left_leg".
-    #[cfg_attr(feature = "typescript", ts(type = "Readonly<Record<string, number>>"))]
-    pub factors: BTreeMap<String, f64>,
+    /// Factors of the humanoid's proportions, on the left and on the right. `[n_proportions, 2]`
+    pub factors: Vec<f64>,
     /// Name of the preset that the factors are, if they are one.
     pub preset: Option<String>,
     /// Whether a factor differs from 1. An export then keeps the ground, unless the user has switched that off.

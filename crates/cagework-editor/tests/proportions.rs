@@ -6,7 +6,6 @@ use cagework_cage::samples;
 use cagework_core::subdivided_box;
 use cagework_editor::{Command, Contents, DocumentSettings, Editor};
 use cagework_io::{Model, read_project, write_mesh_glb};
-use cagework_pose::humanoid::Bone;
 use cagework_pose::proportions::Proportion;
 use glam::Vec3;
 
@@ -124,9 +123,9 @@ fn saved_poses_restore_their_factors_and_a_blend_shows_factors_of_1() {
 #[test]
 fn a_project_keeps_factors_rings_and_given_bones() {
     let mut editor = opened(&GLB);
-    let toes = Command::SetBone { bone: Bone::LeftToes, joint: Some("foot.L".to_owned()) };
+    let toes = Command::SetBone { bone: "leftToes".to_owned(), joint: Some("foot.L".to_owned()) };
     assert!(editor.apply(toes).is_err(), "the joint is the left foot");
-    let chest = Command::SetBone { bone: Bone::Chest, joint: Some("spine".to_owned()) };
+    let chest = Command::SetBone { bone: "chest".to_owned(), joint: Some("spine".to_owned()) };
     editor.apply(chest).unwrap();
     set(&mut editor, "leg", 1.2);
     set(&mut editor, "left_arm", 0.9);
@@ -140,7 +139,7 @@ fn a_project_keeps_factors_rings_and_given_bones() {
     let contents = Contents {
         poses: settings.poses(project.poses, cage.as_ref()),
         cage,
-        bones: settings.bones.clone(),
+        bones: settings.given_bones(),
         ..Contents::default()
     };
     let mut again = Editor::default();
@@ -149,7 +148,7 @@ fn a_project_keeps_factors_rings_and_given_bones() {
     let (a, b) = (editor.document(), again.document());
     assert_eq!((a.proportions, &a.poses, &a.pose), (b.proportions, &b.poses, &b.pose));
     assert_eq!(b.cage.controls.rings, [[0, 1, 2]]);
-    assert!(again.humanoid_info().unwrap().bones.iter().any(|bone| bone.given && bone.bone == Bone::Chest));
+    assert!(again.humanoid_info().unwrap().bones.iter().any(|bone| bone.given && bone.bone == "chest"));
     again.apply(Command::SetPreset { name: None }).unwrap();
     assert_eq!(again.document().pose[4..], again.document().cage.mesh.positions[4..]);
 
@@ -180,14 +179,31 @@ fn models_that_are_no_humanoid_get_a_reason() {
     let info = snake.humanoid_info().unwrap();
     assert!(info.fault.is_some_and(|fault| fault.contains("no joint was found for hips")));
     assert_eq!((info.source, info.bones.len(), info.joints), (None, 14, names.map(str::to_owned).to_vec()));
-    let head = |joint: &str| Command::SetBone { bone: Bone::Head, joint: Some(joint.to_owned()) };
+    let head = |joint: &str| Command::SetBone { bone: "head".to_owned(), joint: Some(joint.to_owned()) };
     snake.apply(head("link 2")).unwrap();
     let given = snake.humanoid_info().unwrap().bones.into_iter().find(|bone| bone.given).unwrap();
-    assert_eq!((given.bone, given.joint.as_deref()), (Bone::Head, Some("link 2")));
+    assert_eq!((given.bone.as_str(), given.joint.as_deref()), ("head", Some("link 2")));
     assert!(snake.apply(head("link 9")).unwrap_err().to_string().contains("there is no joint"));
 
     let wrong = editor.apply(Command::SetProportion { name: "leg".to_owned(), factor: 3.0 }).unwrap_err();
     assert!(wrong.to_string().contains("0.5 to 2"), "{wrong}");
     let wrong = editor.apply(Command::SetPreset { name: Some("giant".to_owned()) }).unwrap_err();
     assert!(wrong.to_string().contains("chibi"), "{wrong}");
+}
+
+#[test]
+fn a_pose_that_is_carried_to_another_cage_keeps_its_factors() {
+    let mut editor = opened(&GLB);
+    set(&mut editor, "leg", 1.2);
+    let from = editor.view().cage_id;
+    let mesh = subdivided_box(editor.bounds().unwrap(), 0.2, [4, 8, 2]);
+    let replace = Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() };
+    editor.apply(replace).unwrap();
+    assert_eq!((factors(&editor), editor.document().cage.controls.rings.len()), ([1.0, 1.0], 0));
+    let positions = editor.document().pose.to_vec();
+    let carry = |from| Command::CarryPoses { from, positions: positions.clone(), shares: Vec::new() };
+    editor.apply(carry(from)).unwrap();
+    assert_eq!(factors(&editor), [1.2, 1.2]);
+    editor.apply(carry(from + 1)).unwrap();
+    assert_eq!(factors(&editor), [1.0, 1.0]);
 }

@@ -11,7 +11,6 @@ use cagework_editor::{
     RestEdit, SurfacePoint, Transition,
 };
 use cagework_io::{Interpolation, Model, read_project};
-use cagework_pose::proportions::Proportions;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use glam::{DVec3, Vec3};
 
@@ -268,7 +267,7 @@ fn saved_and_opened(saved: &Editor) -> Document {
         shares: settings.pose_shares.clone(),
         transition: settings.transition.unwrap_or_default(),
         pins: settings.pins.clone(),
-        bones: settings.bones.clone(),
+        bones: settings.given_bones(),
         sample: settings.sample.clone(),
     };
     let mut members = settings.models.iter().cloned();
@@ -457,14 +456,7 @@ fn poses_are_carried_to_another_cage_by_one_step() {
     assert!(editor.commit("Make a cage"));
     assert_eq!((editor.view().poses[0].fits, editor.view().shares), (false, vec![0.0]));
     let carried = [there.clone(), there.clone()].concat();
-    editor
-        .apply(Command::CarryPoses {
-            from: other,
-            positions: carried,
-            shares: vec![1.0],
-            proportions: Proportions::default(),
-        })
-        .unwrap();
+    editor.apply(Command::CarryPoses { from: other, positions: carried, shares: vec![1.0] }).unwrap();
     assert!(editor.commit("Carry"));
     assert_eq!(*editor.document().pose, *there);
     assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, n));

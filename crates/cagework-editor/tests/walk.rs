@@ -10,8 +10,6 @@ use cagework_editor::{
     Command, Contents, DocumentSettings, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint, Transition,
 };
 use cagework_io::{Interpolation, Model, read_project};
-use cagework_pose::humanoid::Bone;
-use cagework_pose::proportions::Proportions;
 use glam::Vec3;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
@@ -58,7 +56,7 @@ fn command() -> impl Strategy<Value = Command> {
         Just(Command::SetPreset { name: Some("hero".to_owned()) }),
         Just(Command::SetPreset { name: None }),
         Just(Command::MirrorProportions),
-        Just(Command::SetBone { bone: Bone::Head, joint: Some("nobody".to_owned()) }),
+        Just(Command::SetBone { bone: "head".to_owned(), joint: Some("nobody".to_owned()) }),
         index().prop_map(|k| Command::SavePose { name: format!("pose {k}") }),
         index().prop_map(|index| Command::ApplyPose { index }),
         index().prop_map(|index| Command::RenamePose { index, name: "another".to_owned() }),
@@ -74,12 +72,7 @@ fn command() -> impl Strategy<Value = Command> {
         }),
         (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
         (prop_oneof![Just(opened().view().cage_id), any::<u32>()], prop::collection::vec(vector(), 0..30))
-            .prop_map(|(from, positions)| Command::CarryPoses {
-                from,
-                positions,
-                shares: vec![0.5],
-                proportions: Proportions::default()
-            }),
+            .prop_map(|(from, positions)| Command::CarryPoses { from, positions, shares: vec![0.5] }),
         prop::collection::vec(pin, 0..3).prop_map(|pins| Command::SetPins { pins }),
         (1..3_u32, 0.0..0.4_f32).prop_map(|(n, margin)| Command::ReplaceCage {
             mesh: subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, margin, [n; 3]),

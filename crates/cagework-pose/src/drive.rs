@@ -5,7 +5,6 @@
 
 use cagework_core::rig::Rig;
 use glam::{DAffine3, DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
 use crate::humanoid::{Bone, ENDS, Humanoid, N_BONES};
 
@@ -23,7 +22,7 @@ const END_FULL: f64 = 0.5;
 const LEAST: f64 = 0.5;
 
 /// Weights of the bones at each vertex of a cage; each row sums to 1. `[n_cage][N_BONES]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BoneWeights(Vec<[f64; N_BONES]>);
 
 /// Bones of which each vertex of the model has weights. `[n_vertices][N_BONES]`

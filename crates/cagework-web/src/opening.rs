@@ -53,7 +53,7 @@ impl OpenContents {
             shares: settings.pose_shares.clone(),
             transition: settings.transition.unwrap_or_default(),
             pins: settings.pins.clone(),
-            bones: settings.bones.clone(),
+            bones: settings.given_bones(),
             sample: settings.sample.clone().filter(is_known).or(self.sample),
         };
         Ok((contents, settings))

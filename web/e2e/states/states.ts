@@ -174,7 +174,7 @@ const full = (): Record<AppState["step"], Patch> => ({
     clip: { ...INITIAL_STATE.clip, clip: 0 },
     scene: { ...INITIAL_STATE.scene, slice: "value", colour: "weight" },
     humanoid: HUMANOID,
-    factors: { left_leg: 2, right_leg: 2 },
+    factors: [2, 2],
     folds: [{ proportion: "leg", min: 0.5, max: 1.5 }],
     scaled: true,
     apart: true,

@@ -4,7 +4,6 @@ import type { CageArrays, Interpolation, PoseView, Transition } from "../contrac
 import { fittingPoses } from "../derived";
 import { triples } from "../points";
 import { follow } from "../queue";
-import type { AppState } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
@@ -17,15 +16,13 @@ export interface CageSnapshot {
   /** The current pose, then each saved pose that fits this cage. `[1 + n_poses, n_controls, 3]` */
   readonly poses: Float32Array;
   readonly shares: readonly number[];
-  /** Factors of the proportions that the current pose contains. */
-  readonly factors: AppState["factors"];
 }
 
 /** Copies the current cage and its poses; undefined without a cage. */
 export function snapshotCage(ctx: Context): CageSnapshot | undefined {
-  const { cage, cageId: id, shares, factors } = ctx.store.get();
+  const { cage, cageId: id, shares } = ctx.store.get();
   const engine = ctx.engine();
-  return cage ? { cage: engine.cageArrays(), id, poses: engine.carriable(), shares, factors } : undefined;
+  return cage ? { cage: engine.cageArrays(), id, poses: engine.carriable(), shares } : undefined;
 }
 
 /** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for high-density screens. */
@@ -45,7 +42,7 @@ export function createPoses(ctx: Context, edit: Edit) {
   // Undo steps must not contain an intermediate pose of the animation.
   edit.alsoSettles(stop);
 
-  const carry = ({ cage, id, poses, shares, factors }: CageSnapshot, label?: string): Promise<boolean> => {
+  const carry = ({ cage, id, poses, shares }: CageSnapshot, label?: string): Promise<boolean> => {
     const n = cage.positions.length;
     const isAtRest = cage.positions.every((x, i) => x === poses[i]);
     return attempt(ctx, T.failed.carry, () =>
@@ -58,8 +55,7 @@ export function createPoses(ctx: Context, edit: Edit) {
         // current pose if the old cage was at rest or the cage is being reshaped.
         if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
         const positions = triples(carried);
-        const proportions = factors;
-        engine().apply({ do: "carry_poses", from: id, positions, shares: [...shares], proportions }, label);
+        engine().apply({ do: "carry_poses", from: id, positions, shares: [...shares] }, label);
         if (!label) engine().amend();
       }),
     );

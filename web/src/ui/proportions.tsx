@@ -51,31 +51,32 @@ function Presets({ app }: { app: App }) {
   );
 }
 
-/** A slider: the name of its proportion in commands, the name in `AppState.factors`, and the title. */
-type Entry = readonly [name: string, factor: string, title: string];
+/** A slider: the name of its proportion in commands, its title and its value. */
+type Entry = readonly [name: string, title: string, factor: number];
 
 function Sliders({ app }: { app: App }) {
   const { factors, folds, bound, bindRun, apart, scaled } = app.store.get();
   useEffect(() => void app.proportions.measure(), [bound, bindRun, folds]);
-  const titles = T.proportions.titles;
-  const isApart =
-    apart || PROPORTIONS.some(({ name }) => factors[`left_${name}`] !== factors[`right_${name}`]);
-  const entries = ({ name, sided }: Facts): readonly Entry[] => {
-    const [left, right] = [`left_${name}`, `right_${name}`];
-    if (!sided) return [[name, name, titles[name]]];
-    if (!isApart) return [[name, left, titles[name]]];
+  const sidesOf = (facts: Facts) => {
+    const k = 2 * PROPORTIONS.indexOf(facts);
+    return [factors[k] ?? 1, factors[k + 1] ?? 1] as const;
+  };
+  const isApart = apart || PROPORTIONS.some((facts) => sidesOf(facts)[0] !== sidesOf(facts)[1]);
+  const entries = (facts: Facts): readonly Entry[] => {
+    const { name, sided } = facts;
+    const title = T.proportions.titles[name];
+    const [left, right] = sidesOf(facts);
+    if (!sided || !isApart) return [[name, title, left]];
     return [
-      [left, left, T.proportions.left(titles[name])],
-      [right, right, T.proportions.right(titles[name])],
+      [`left_${name}`, T.proportions.left(title), left],
+      [`right_${name}`, T.proportions.right(title), right],
     ];
   };
   const rangeOf = (facts: Facts) =>
     folds?.find(({ proportion }) => proportion === facts.name) ?? SLIDERS.factor;
   const folded = PROPORTIONS.flatMap((facts) => {
     const { min, max } = rangeOf(facts);
-    return entries(facts).filter(
-      ([, factor]) => (factors[factor] ?? 1) < min || (factors[factor] ?? 1) > max,
-    );
+    return entries(facts).filter(([, , factor]) => factor < min || factor > max);
   });
   return (
     <>
@@ -83,14 +84,14 @@ function Sliders({ app }: { app: App }) {
         <fieldset class="field sliders" key={group}>
           <legend class="legend-text">{T.proportions.groups[group]}</legend>
           {PROPORTIONS.filter((facts) => facts.group === group).map((facts) =>
-            entries(facts).map(([name, factor, title]) => (
+            entries(facts).map(([name, title, factor]) => (
               <Slider
                 key={name}
                 label={title}
                 {...RANGE}
                 usual={facts.natural}
                 limits={rangeOf(facts)}
-                value={factors[factor] ?? 1}
+                value={factor}
                 onChange={(value) => app.proportions.set(name, value)}
                 onCommit={() => app.proportions.commit(title)}
                 onReset={() => {
@@ -103,7 +104,7 @@ function Sliders({ app }: { app: App }) {
         </fieldset>
       ))}
       {folded.length > 0 && (
-        <p class="hint warn-text">{T.proportions.folds(list(folded.map(([, , title]) => title)))}</p>
+        <p class="hint warn-text">{T.proportions.folds(list(folded.map(([, title]) => title)))}</p>
       )}
       <div class="row">
         <div class="grow">

@@ -23,7 +23,6 @@ function page() {
   fake.show({
     poses: [{ name: "Pose 1", fits: true, seconds: 1, interpolation: null, hash: 7 }],
     shares: [1],
-    factors: { left_leg: 1.2 },
     posed: true,
   });
   return { ...fake, poses };
@@ -125,8 +124,7 @@ it("poses of a previous cage are carried over as one step", async () => {
   asked.at(-1)?.resolve(new Float32Array(9).fill(7));
   await done;
   const positions = Array(3).fill([7, 7, 7]);
-  const proportions = { left_leg: 1.2 };
-  expect(commands).toEqual([{ do: "carry_poses", from: 77, positions, shares: [1], proportions }]);
+  expect(commands).toEqual([{ do: "carry_poses", from: 77, positions, shares: [1] }]);
   expect([did.at(-1), ctx.store.get().editingRest]).toEqual(["Carry poses over", false]);
 });
 

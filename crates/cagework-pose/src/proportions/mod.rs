@@ -348,7 +348,7 @@ pub struct ProportionRange {
 }
 
 /// A cage of a humanoid, with weights of the bones at its vertices.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct HumanoidCage {
     rest: Vec<Vec3>,
     weights: BoneWeights,
@@ -357,13 +357,11 @@ pub struct HumanoidCage {
     frame: Frame,
     /// Height of the chin above the middle of the hip joints.
     chin: f64,
-    /// Left out where ranges are measured.
-    #[serde(skip)]
     ends: Option<EndFit>,
 }
 
 /// Axes of a figure, and heights above the middle of its hip joints.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Frame {
     hips: DVec3,
     up: DVec3,

@@ -7,7 +7,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::flat;
-use crate::error::Answer;
+use crate::cage::RigArrays;
+use crate::error::{Answer, ErrorName, Fault};
 use crate::folds::FoldArrays;
 use crate::views::{object, optional};
 use crate::weights::{BoundArrays, Offsets};
@@ -20,21 +21,30 @@ impl Engine {
         optional(self.state.borrow_mut().editor.humanoid_info())
     }
 
-    /// A part of the bound models, for `Binder.proportionRanges`.
+    /// The humanoid and a part of its bind, for `Binder.proportionRanges`.
     ///
     /// # Errors
-    /// If the models are not a humanoid, and before a bind.
+    /// Before a bind, or if the rig cannot be read.
     #[wasm_bindgen(js_name = foldSample, unchecked_return_type = "FoldArrays")]
     pub fn fold_sample(&self) -> Answer<JsValue> {
-        let cage = self.state.borrow_mut().editor.humanoid_cage()?;
-        let sample = self.read(|state| state.bound_document().fold_sample(cage))?;
-        let FoldSample { cage, weights, frames, positions, triangles } = sample;
-        let offsets = Offsets { frames: (*frames).clone(), outside: Vec::new() };
-        Ok(object(&FoldArrays {
-            cage: (*cage).clone(),
-            weights: BoundArrays::of(&weights, offsets),
-            positions: Float32Array::from(flat(&positions).as_slice()),
-            triangles: Uint32Array::from(triangles.as_flattened()),
-        }))
+        let info = self.state.borrow_mut().editor.humanoid_info();
+        let bones = info.into_iter().flat_map(|info| info.bones);
+        self.read(|state| {
+            let FoldSample { weights, frames, positions, triangles } =
+                state.bound_document().fold_sample()?;
+            let (points, _) =
+                state.models().states(None).map_err(|error| Fault::new(ErrorName::Error, error))?;
+            let offsets = Offsets { frames: (*frames).clone(), outside: Vec::new() };
+            Ok(object(&FoldArrays {
+                rest: Float32Array::from(flat(&state.rest().positions).as_slice()),
+                rings: state.cage().controls.rings.clone(),
+                rig: RigArrays::of(&state.models().rest_rig().unwrap_or_default()),
+                bones: bones.filter_map(|bone| Some((bone.bone, bone.joint?))).collect(),
+                points: Float32Array::from(flat(&points).as_slice()),
+                weights: BoundArrays::of(&weights, offsets),
+                positions: Float32Array::from(flat(&positions).as_slice()),
+                triangles: Uint32Array::from(triangles.as_flattened()),
+            }))
+        })
     }
 }
