@@ -12,7 +12,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::controls::{CageControls, InnerKind, RestCage};
-use crate::document::{Document, NamedPose, Transition};
+use crate::document::{NamedPose, Transition};
 use crate::edit::SelectMode;
 use crate::editor::Editor;
 use crate::error::EditError;
@@ -552,7 +552,7 @@ impl Editor {
     ) -> Result<(), EditError> {
         let (cage, pose) = (&self.document().cage, self.document().pose.clone());
         let cage = RestCage::new(cage.mesh.clone(), change(cage.controls.clone()))?;
-        let Document { shares, proportions, .. } = self.document().clone();
+        let (shares, proportions) = (self.document().shares.clone(), self.document().proportions);
         self.set_cage(cage);
         self.set_pose(pose.to_vec())?;
         let document = self.document_mut();

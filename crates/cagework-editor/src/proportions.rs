@@ -129,9 +129,12 @@ impl HumanoidInfo {
             joint: joint_of(bone),
             given: given.iter().any(|(own, _)| *own == bone),
         });
-        let mut joints: Vec<String> = rig.joints.iter().map(|joint| joint.name.clone()).collect();
-        joints.sort();
-        joints.dedup();
+        let mut joints: Vec<String> = Vec::new();
+        for joint in &rig.joints {
+            if !joints.contains(&joint.name) {
+                joints.push(joint.name.clone());
+            }
+        }
         Self {
             bones: bones.collect(),
             joints,

@@ -1,10 +1,14 @@
 //! Proportions of a humanoid: factors displace the pose, and are undone, saved and restored with it.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use cagework_cage::samples;
-use cagework_core::subdivided_box;
-use cagework_editor::{Command, Contents, DocumentSettings, Editor};
+use cagework_core::bind::fineness::ROUGH_GRID;
+use cagework_core::progress::NoProgress;
+use cagework_core::{BindOptions, Binding, bind, subdivided_box};
+use cagework_editor::{
+    BoundDocument, BoundModels, Command, Contents, DocumentSettings, Editor, FoldSample, KnownGround,
+};
 use cagework_io::{Model, read_project, write_mesh_glb};
 use cagework_pose::proportions::Proportion;
 use glam::Vec3;
@@ -206,4 +210,24 @@ fn a_pose_that_is_carried_to_another_cage_keeps_its_factors() {
     assert_eq!(factors(&editor), [1.2, 1.2]);
     editor.apply(carry(from + 1)).unwrap();
     assert_eq!(factors(&editor), [1.0, 1.0]);
+}
+
+#[test]
+fn a_sample_of_the_triangles_folds_where_the_model_does() {
+    let mut editor = opened(&GLB);
+    let cage = editor.humanoid_cage().unwrap();
+    let document = editor.document();
+    let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
+    let (positions, set) = (document.models.positions(), document.cage.set.as_ref().unwrap());
+    let Binding { weights, frames, .. } = bind(positions, set, &options, &NoProgress).unwrap();
+    let bound = Arc::new(BoundModels::new(document, weights, frames, Vec::new()));
+    let ground = KnownGround::default();
+    let all =
+        BoundDocument { editor: &editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
+    let FoldSample { weights, frames, positions, triangles } = all.fold_sample().unwrap();
+    assert!((7_000..=8_000).contains(&triangles.len()), "{} triangles", triangles.len());
+    let sampled = cage.ranges((&weights, &frames), &positions, &triangles);
+    let models = &document.models;
+    let exact = cage.ranges((&bound.weights, &bound.frames), models.positions(), models.triangles());
+    assert_eq!(sampled, exact);
 }

@@ -343,6 +343,7 @@ fn damaged_projects_open_as_valid_documents() {
                 shares: settings.pose_shares.clone(),
                 transition: settings.transition.unwrap_or_default(),
                 pins: settings.pins.clone(),
+                bones: settings.given_bones(),
                 sample: settings.sample.clone(),
             };
             editor.open(models, contents);

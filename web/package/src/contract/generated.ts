@@ -224,7 +224,7 @@ export type BoneSource = "vrm" | "names" | "shape";
  */
 export type BoneView = {
 /**
- * The bone.
+ * Name of the bone.
  */
 bone: Bone,
 /**
@@ -475,7 +475,7 @@ factor: number, } | { "do": "set_preset",
  */
 name: string | null, } | { "do": "mirror_proportions" } | { "do": "set_bone",
 /**
- * The bone.
+ * Name of the bone.
  */
 bone: Bone,
 /**
@@ -561,11 +561,7 @@ positions: readonly (readonly [number, number, number])[],
 /**
  * Shares of the saved poses in the current pose.
  */
-shares: Array<number>,
-/**
- * Factors of the proportions that the current pose contains.
- */
-proportions?: Readonly<Record<string, number>>, } | { "do": "set_pins",
+shares: Array<number>, } | { "do": "set_pins",
 /**
  * Points on the surfaces of the models.
  */
@@ -695,23 +691,35 @@ repair: Repair, } | { "kind": "grid",
  */
 cells: number, };
 /**
- * A part of a bound humanoid.
+ * A humanoid in its cage, and a part of its bind.
  */
 export type FoldArrays = {
 /**
- * The cage with the bones.
+ * Cage vertices and inner controls at rest. `[n_controls, 3]`
  */
-cage: unknown,
+rest: Float32Array,
 /**
- * Weights of the vertices.
+ * Loops of cage vertices around limbs.
+ */
+rings: Array<Array<number>>, rig: RigArrays,
+/**
+ * Bones and the names of their joints.
+ */
+bones: Array<[string, string]>,
+/**
+ * Points at rest that the influences of the rig belong to. `[n_points, 3]`
+ */
+points: Float32Array,
+/**
+ * Weights of some vertices.
  */
 weights: BoundArrays,
 /**
- * Vertices at rest. `[n_vertices, 3]`
+ * These vertices at rest. `[n_vertices, 3]`
  */
 positions: Float32Array,
 /**
- * `[n_triangles, 3]`
+ * Triangles of these vertices. `[n_triangles, 3]`
  */
 triangles: Uint32Array, };
 /**
@@ -1558,9 +1566,9 @@ pins: Array<SurfacePoint>,
  */
 posed: boolean,
 /**
- * Factors of the humanoid's proportions, each side of those with two sides alone, such as "left_leg".
+ * Factors of the humanoid's proportions, on the left and on the right. `[n_proportions, 2]`
  */
-factors: Readonly<Record<string, number>>,
+factors: Array<number>,
 /**
  * Name of the preset that the factors are, if they are one.
  */
@@ -1632,7 +1640,7 @@ nonzeros: number, };
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false,"ground_off":false};
-export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":{},"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
+export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":[],"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
