@@ -425,6 +425,10 @@ impl Editor {
         self.humanoid.info(&self.document)
     }
 
+    pub(crate) fn humanoid_cache(&mut self) -> &mut HumanoidCache {
+        &mut self.humanoid
+    }
+
     /// Humanoid bones of the models of this document or of a changed copy of it.
     pub(crate) fn humanoid_of(&mut self, document: &Document) -> Result<Humanoid, HumanoidError> {
         self.humanoid.humanoid(document)

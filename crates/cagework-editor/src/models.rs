@@ -442,10 +442,20 @@ impl Models {
     /// Joints of the same name are one. `None` without joints, or if they cannot be read.
     #[must_use]
     pub fn rest_rig(&self) -> Option<Rig> {
+        self.rig_of(|model| Some(model.states(None).ok()?.0.len()))
+    }
+
+    /// Like [`Self::rest_rig`], with the influences on [`Self::positions`].
+    pub(crate) fn vertex_rig(&self) -> Option<Rig> {
+        self.rig_of(|model| Some(model.positions.len()))
+    }
+
+    /// The joined rig of the models. `n_points`: number of points of a model, its vertices first.
+    fn rig_of(&self, n_points: impl Fn(&Model) -> Option<usize>) -> Option<Rig> {
         let mut all = Rig::default();
         for member in self.iter() {
-            let n = member.model.states(None).ok()?.0.len();
-            all.append(member.model.rest_rig().ok().flatten().as_ref(), n);
+            let rig = member.model.rest_rig().ok().flatten();
+            all.append(rig.as_ref(), n_points(&member.model)?);
         }
         Some(all).filter(|rig| !rig.joints.is_empty())
     }

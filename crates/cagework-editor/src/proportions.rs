@@ -63,7 +63,24 @@ pub struct BoneView {
 pub(crate) struct HumanoidCache {
     found: Option<((u64, GivenBones), Result<Humanoid, HumanoidError>)>,
     info: Option<((u64, GivenBones), Option<HumanoidInfo>)>,
-    cage: Option<((Key, GivenBones), Arc<HumanoidCage>)>,
+    cage: Option<(CageKey, Arc<HumanoidCage>)>,
+    /// The last bind, and the models and the cage that were bound.
+    bind: Option<(Key, Arc<Weights>)>,
+}
+
+/// What a prepared cage depends on.
+#[derive(Debug)]
+struct CageKey {
+    document: Key,
+    bones: GivenBones,
+    bind: Option<Arc<Weights>>,
+}
+
+impl PartialEq for CageKey {
+    fn eq(&self, other: &Self) -> bool {
+        let is_same_bind = self.bind.as_ref().map(Arc::as_ptr) == other.bind.as_ref().map(Arc::as_ptr);
+        is_same_bind && self.document == other.document && self.bones == other.bones
+    }
 }
 
 impl HumanoidCache {
@@ -85,7 +102,12 @@ impl HumanoidCache {
         if document.cage.mesh.faces.is_empty() {
             return Err(EditError::NoCage);
         }
-        let key = (document.key(), document.models.given_bones());
+        let bind = self.bind.as_ref().filter(|(bound, _)| *bound == document.key());
+        let key = CageKey {
+            document: document.key(),
+            bones: document.models.given_bones(),
+            bind: bind.map(|(_, weights)| Arc::clone(weights)),
+        };
         if let Some((_, cage)) = self.cage.as_ref().filter(|(known, _)| *known == key) {
             return Ok(Arc::clone(cage));
         }
@@ -93,7 +115,10 @@ impl HumanoidCache {
         let rig = models.rest_rig().ok_or(HumanoidError::NoRig)?;
         let (positions, _) = models.states(None).map_err(|_| EditError::NoModel)?;
         let RestCage { mesh, controls, .. } = &*document.cage;
-        let cage = HumanoidCage::new(&mesh.positions, &controls.rings, &positions, &rig, &humanoid);
+        let mut cage = HumanoidCage::new(&mesh.positions, &controls.rings, &positions, &rig, &humanoid);
+        if let (Some(weights), Some(rig)) = (&key.bind, models.vertex_rig()) {
+            cage = cage.with_bind(weights, models.positions(), &rig, &humanoid);
+        }
         let cage = Arc::new(cage);
         self.cage = Some((key, Arc::clone(&cage)));
         Ok(cage)
@@ -145,6 +170,13 @@ impl HumanoidInfo {
 }
 
 impl Editor {
+    /// Sets the weights by which the models follow the cage; `None` before a bind. With them, hands, feet and head keep
+    /// their shape better when proportions change.
+    pub fn set_bind(&mut self, weights: Option<&Arc<Weights>>) {
+        let key = self.document().key();
+        self.humanoid_cache().bind = weights.map(|weights| (key, Arc::clone(weights)));
+    }
+
     /// Sets the factor of a proportion by name, such as "leg" or "left_leg".
     pub(crate) fn set_proportion(&mut self, name: &str, factor: f64) -> Result<(), EditError> {
         let mut next = self.document().proportions;

@@ -4,6 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use cagework_cage::samples;
 use cagework_core::bind::fineness::ROUGH_GRID;
+use cagework_core::deform::deform_bound;
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Binding, bind, subdivided_box};
 use cagework_editor::{
@@ -212,15 +213,44 @@ fn a_pose_that_is_carried_to_another_cage_keeps_its_factors() {
     assert_eq!(factors(&editor), [1.0, 1.0]);
 }
 
-#[test]
-fn a_sample_of_the_triangles_folds_where_the_model_does() {
-    let mut editor = opened(&GLB);
-    let cage = editor.humanoid_cage().unwrap();
+/// The document, bound on a coarse grid.
+fn bound(editor: &Editor) -> Arc<BoundModels> {
     let document = editor.document();
     let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
     let (positions, set) = (document.models.positions(), document.cage.set.as_ref().unwrap());
     let Binding { weights, frames, .. } = bind(positions, set, &options, &NoProgress).unwrap();
-    let bound = Arc::new(BoundModels::new(document, weights, frames, Vec::new()));
+    Arc::new(BoundModels::new(document, weights, frames, Vec::new()))
+}
+
+/// The head of the sample is about 0.35 units high and above 1.6. The box around the figure has no vertices at its chin.
+#[test]
+fn with_a_bind_the_head_reaches_its_size() {
+    let mut editor = opened(&GLB);
+    let (bound, positions) = (bound(&editor), editor.document().models.positions().to_vec());
+    let head = |pose: &[Vec3]| {
+        let at = deform_bound(&bound.weights, &bound.frames, pose);
+        let own = at.iter().zip(&positions).filter(|(_, rest)| rest.y > 1.7).map(|(p, _)| p.x);
+        own.clone().fold(f32::MIN, f32::max) - own.fold(f32::MAX, f32::min)
+    };
+    let width = head(&editor.document().pose);
+    set(&mut editor, "head", 1.4);
+    let without = head(&editor.document().pose) / width;
+    set(&mut editor, "head", 1.0);
+    editor.set_bind(Some(&bound.weights));
+    set(&mut editor, "head", 1.4);
+    let with = head(&editor.document().pose) / width;
+    assert!((with - 1.4).abs() < 0.5 * (without - 1.4).abs(), "{without} {with}");
+    // Poses that were made without the bind lose their factors exactly.
+    set(&mut editor, "head", 1.0);
+    assert_eq!(editor.document().pose[..], editor.document().cage.mesh.positions[..]);
+}
+
+#[test]
+fn a_sample_of_the_triangles_folds_where_the_model_does() {
+    let mut editor = opened(&GLB);
+    let cage = editor.humanoid_cage().unwrap();
+    let bound = bound(&editor);
+    let document = editor.document();
     let ground = KnownGround::default();
     let all =
         BoundDocument { editor: &editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };

@@ -178,6 +178,7 @@ impl State {
             self.faults.clear();
             self.draft.clear();
             (self.bound, self.parts) = (None, None);
+            self.editor.set_bind(None);
             if key.mesh != before.mesh {
                 self.n_rig = None;
                 self.painting = None;
@@ -300,6 +301,7 @@ impl State {
     /// Uses `bound` as the weights of the current document, with the report of their bind, and ends the playback of a
     /// clip.
     pub(crate) fn set_bound(&mut self, (bound, report): (Arc<BoundModels>, Rc<JsValue>)) {
+        self.editor.set_bind(Some(&bound.weights));
         (self.bound, self.report) = (Some(bound), report);
         self.playing = None;
         self.prepare_parts();
@@ -397,6 +399,7 @@ impl State {
     pub(crate) fn forget_gpu(&mut self) {
         self.on_gpu = GpuKeys::default();
         (self.bound, self.parts) = (None, None);
+        self.editor.set_bind(None);
     }
 
     /// Marks the mesh of the current document as uploaded, and its weights and parts as not uploaded.
