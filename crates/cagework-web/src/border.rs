@@ -31,6 +31,7 @@ use crate::folds::FoldArrays;
 use crate::opening::OpenContents;
 use crate::options::JsSceneOptions;
 use crate::puller::{GrabInput, GrabResult, PullFrame};
+use crate::reshape::ProportionsRequest;
 use crate::views::View;
 use crate::weights::BoundArrays;
 
@@ -78,6 +79,7 @@ fn generated_types_are_up_to_date() {
     found.visit::<BindReport>();
     found.visit::<CageState>();
     found.visit::<RigArrays>();
+    found.visit::<ProportionsRequest>();
     found.visit::<Problem>();
     found.visit::<ModelInfo>();
     found.visit::<Command>();

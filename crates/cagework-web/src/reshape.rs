@@ -1,13 +1,19 @@
 //! Methods for the npm package that deform model files and apply weights without a GPU.
 
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
 use cagework_core::deform::{deform_finite, displacements};
 use cagework_core::field::{CELLS, FieldWeights, Lattice};
-use cagework_core::options::OutsidePolicy;
+use cagework_core::options::{OutsidePolicy, UnknownWord};
 use cagework_core::{Binding, Controls, Frames, Weights};
 use cagework_editor::{PageBindOptions, RigOptions};
 use cagework_io::{Model, ModelFormat, ReshapeOptions};
 use cagework_pose::Parts;
+use cagework_pose::humanoid::Bone;
+use cagework_pose::proportions::{HumanoidCage, Proportions};
 use js_sys::{Array, Float32Array, Function, Uint32Array};
+use serde::Deserialize;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -99,6 +105,50 @@ impl Binder {
         }
         let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig);
         Ok(model.write(model.format(), &deformed)?)
+    }
+}
+
+/// What `proportions` of the npm package takes beside model and cage.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct ProportionsRequest {
+    /// Factors by the names of the proportions.
+    factors: BTreeMap<String, f64>,
+    /// Name of a preset whose other factors apply.
+    preset: Option<String>,
+    /// Joints of humanoid bones that are not found, by the names of the bones in VRM 1.0.
+    bones: BTreeMap<String, String>,
+}
+
+#[wasm_bindgen]
+impl Binder {
+    /// Binds the model of a humanoid and poses its cage by proportions (`ProportionsRequest`). Other arguments as for
+    /// `bind`. Returns the controls, `[n_controls, 3]`.
+    ///
+    /// # Errors
+    /// If the model is not a humanoid, a name or factor is not valid, or the bind fails.
+    pub async fn proportions(
+        &self,
+        loaded: &LoadedModel,
+        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "ProportionsRequest")] request: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
+    ) -> Answer<Vec<f32>> {
+        let (model, request): (&Model, ProportionsRequest) = (&loaded.model, decode(request)?);
+        let wrong = |error: &dyn Display| Fault::new(ErrorName::Error, error);
+        let named = request.bones.into_iter().map(|(bone, joint)| Ok((bone.parse::<Bone>()?, joint)));
+        let bones = named.collect::<Result<Vec<_>, UnknownWord>>().map_err(|e| wrong(&e))?;
+        let proportions =
+            Proportions::of(request.preset.as_deref(), &request.factors).map_err(|e| wrong(&e))?;
+        let (rig, humanoid) = model.humanoid(&bones)?;
+        let set = control_set(cage)?;
+        let mut request: PageBindOptions = decode(options)?;
+        request.options.held = model.bytes();
+        let bound = self.run(&model.positions, &set, request, progress).await?;
+        let posed = HumanoidCage::new(Controls::from(&set).rest(), &[], &model.positions, &rig, &humanoid);
+        let posed = posed.with_bind(&bound.weights, &model.positions, &rig, &humanoid);
+        Ok(flat(&posed.pose(&proportions)))
     }
 }
 

@@ -138,6 +138,19 @@ export function createApi(open: () => Promise<Runtime>): Api {
       await requireGpu(options);
       return (await run("reshape", input, options)) as Uint8Array<ArrayBuffer>;
     },
+    async proportions(model, cage, factors, options = {}) {
+      const { preset = null, bones = {}, ...rest } = options;
+      requireKnown(rest, CALL_OPTIONS, { name: null }, BIND_ON_CPU);
+      const input = {
+        files: [fileOf(model, options)],
+        origin: originOf("cage.origin", cage.origin ?? [0, 0, 0]),
+        cage: cageOf(cage),
+        request: { factors, preset, bones },
+        options: bindOptions(rest),
+      };
+      await requireGpu(rest);
+      return run("proportions", input, rest);
+    },
     async readModel(model, options = {}) {
       requireKnown(options, CALL_OPTIONS, { name: null, states: null, clip: null });
       const { states = false, clip } = options;

@@ -39,6 +39,11 @@ export const field: Api["field"] = api.field;
  */
 export const reshape: Api["reshape"] = api.reshape;
 /**
+ * Pose of the cage of a rigged humanoid, `[n_controls, 3]`: longer legs, a bigger head. `factors`: from 0.5 to 2, by
+ * names such as `leg`, `head` or `left_arm`. Give the pose to `reshape` with `ground: true`.
+ */
+export const proportions: Api["proportions"] = api.proportions;
+/**
  * Vertices and triangles of a file, in the order in which `reshape` binds them. With `states`, also the vertices of its
  * morph targets, for a cage that encloses them.
  */

@@ -15,9 +15,9 @@ const api = /* @__PURE__ */ createApi(async () => {
   const most = availableParallelism();
   return { pkg, openClient: () => createClient(module, openThread), most, hasGpu: false };
 });
-const { bind, generateCage, deform, field, reshape, readModel } = api;
+const { bind, generateCage, deform, field, proportions, reshape, readModel } = api;
 
-export { bind, deform, field, generateCage, readModel, reshape };
+export { bind, deform, field, generateCage, proportions, readModel, reshape };
 
 /** Gives a thread the interface of a browser's worker. The thread keeps the process alive only while it runs jobs. */
 function openThread(): Worker {

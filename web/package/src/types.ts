@@ -117,6 +117,17 @@ export type ReshapeCallOptions = CallOptions &
   Partial<BindOptions> &
   Partial<Omit<RigOptions, "dynamic" | "expressions">>;
 
+/**
+ * `preset`: start from the factors of a preset, such as "chibi". `bones`: names of joints by humanoid bones, with their
+ * names in VRM 1.0, for bones that are not found.
+ */
+export type ProportionsCallOptions = CallOptions &
+  NameOption &
+  Partial<BindOptions> & {
+    readonly preset?: string | undefined;
+    readonly bones?: Readonly<Record<string, string>> | undefined;
+  };
+
 /** The deformation of the space in and around a cage, for points that are not bound. */
 export interface Field {
   /** Sets the pose of the cage, without binding the lattice again. */
@@ -154,5 +165,11 @@ export interface Api {
     posed: ArrayLike<number>,
     options?: ReshapeCallOptions,
   ): Promise<Uint8Array<ArrayBuffer>>;
+  proportions(
+    model: File,
+    cage: Cage,
+    factors: Readonly<Record<string, number>>,
+    options?: ProportionsCallOptions,
+  ): Promise<Float32Array>;
   readModel(model: File, options?: ReadCallOptions): Promise<ModelMesh>;
 }

@@ -8,7 +8,7 @@ import { availableParallelism, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { inflateRawSync } from "node:zlib";
-import { bind, deform, field, generateCage, readModel, reshape } from "@cagework/core";
+import { bind, deform, field, generateCage, proportions, readModel, reshape } from "@cagework/core";
 import { CageDeformer } from "@cagework/core/three";
 import {
   BufferAttribute,
@@ -163,6 +163,18 @@ for (const [options, line] of [
     assert.ok(Buffer.from(out).equals(readFileSync(join(folder, "out.glb"))));
   });
 }
+
+test("proportions pose the cage as the command does", async () => {
+  command("proportions model.glb --cage cage.obj --preset chibi --leg 1.2 -g 24 --pose-out tall.obj");
+  const pose = await proportions(glb, cage, { leg: 1.2 }, { preset: "chibi", grid: 24 });
+  const lines = readFileSync(join(folder, "tall.obj"), "utf8").split("\n");
+  const at = lines
+    .filter((line) => line.startsWith("v "))
+    .flatMap((line) => line.split(" ").slice(1, 4).map(Number));
+  const farthest = Math.max(...at.map((x, k) => Math.abs(x - pose[k])));
+  assert.ok(at.length === pose.length && farthest < 1e-4 * size, `${farthest}`);
+  await assert.rejects(proportions(glb, cage, { tail: 1 }, { grid: 24 }), /no proportion "tail"/);
+});
 
 test("the example of the README runs", async () => {
   const [, code] = /```js\n([\s\S]*?)```/.exec(

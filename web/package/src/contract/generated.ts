@@ -13,7 +13,7 @@ export type BindOptions = {
  */
 backend: Backend,
 /**
- * Cells along the longest side of the cage's box, 8 to 512; with box cells of the classic method, along each side.
+ * Cells along the longest side of the cage's box, 8 to 512; with the classic method, along each side.
  * [`AUTO_GRID`] (0, or "auto" in JSON that is read) chooses the number for the cage. Default 0.
  */
 grid: number,
@@ -26,25 +26,13 @@ method: Method,
  */
 solver: Solver,
 /**
- * Preconditioner of conjugate gradients. Default none.
- */
-preconditioner: Preconditioner,
-/**
- * Cell shape of the classic method. Default box.
- */
-cell_shape: CellShape,
-/**
- * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
- */
-delta_norm: DeltaNorm,
-/**
  * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
  * of the other solvers. Default 1e-5.
  */
 tau: number,
 /**
- * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles, and steps with a V-cycle in each,
- * also stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. V-cycles also
+ * stop at [`MAX_CYCLES`](crate::solve::stop::MAX_CYCLES). Default 20,000.
  */
 max_iterations: number,
 /**
@@ -74,10 +62,6 @@ method: Method,
  */
 solver: Solver,
 /**
- * Preconditioner of conjugate gradients.
- */
-preconditioner: Preconditioner,
-/**
  * Processor that computed the bind.
  */
 backend: Backend,
@@ -105,14 +89,6 @@ dims: [number, number, number],
  * Edge lengths of a cell, object units.
  */
 cell_size: [number, number, number],
-/**
- * Shape of the cells: rectangular (K. Smith) or cubic.
- */
-cell_shape: CellShape,
-/**
- * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2; `docs/method.md`, sources).
- */
-delta_norm: DeltaNorm,
 /**
  * Convergence threshold for delta, the last value of `delta_history`.
  */
@@ -349,11 +325,11 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
  */
 quads: number, bounds: Bounds, notices: Array<string>, };
 /**
- * Kind of a generated cage. Serde aliases are names in older project files.
+ * Kind of a generated cage.
  */
 export type CageKind = "auto" | "skeleton" | "shell" | "hull";
 /**
- * Options of [`super::generate`]. Serde aliases are names in older project files.
+ * Options of [`super::generate`].
  */
 export type CageOptions = {
 /**
@@ -438,10 +414,6 @@ boundary: number,
  * Cells outside the cage.
  */
 exterior: number, };
-/**
- * Cell shape of the classic method.
- */
-export type CellShape = "box" | "cubic";
 /**
  * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
@@ -639,17 +611,9 @@ id: number,
  */
 amounts: Array<number>, };
 /**
- * Compression of a GLB.
- */
-export type Compression = "none" | "meshopt";
-/**
  * Kind of coordinates.
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
-/**
- * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
- */
-export type DeltaNorm = "euclidean" | "literal";
 /**
  * Options of a drag.
  */
@@ -1081,10 +1045,6 @@ interpolation: Interpolation | null,
  */
 hash: number, };
 /**
- * Preconditioner of conjugate gradients.
- */
-export type Preconditioner = "none" | "v_cycle";
-/**
  * All occurrences of one kind of problem.
  */
 export type Problem = {
@@ -1153,6 +1113,22 @@ min: number,
  * Greatest factor.
  */
 max: number, };
+/**
+ * What `proportions` of the npm package takes beside model and cage.
+ */
+export type ProportionsRequest = {
+/**
+ * Factors by the names of the proportions.
+ */
+factors: { [key in string]: number },
+/**
+ * Name of a preset whose other factors apply.
+ */
+preset: string | null,
+/**
+ * Joints of humanoid bones that are not found, by the names of the bones in VRM 1.0.
+ */
+bones: { [key in string]: string }, };
 /**
  * One frame of a pull.
  */
@@ -1286,15 +1262,7 @@ feet: Feet,
 /**
  * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
  */
-expressions: boolean,
-/**
- * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
- */
-quantize: boolean,
-/**
- * Compression of the buffers.
- */
-compress: Compression, };
+expressions: boolean, };
 /**
  * Place of a cage vertex in a ring.
  */
@@ -1637,9 +1605,9 @@ max_sum_error: number,
  * Number of stored weights.
  */
 nonzeros: number, };
-export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
+export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false,"ground_off":false};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"plain":false,"dynamic":false,"ground_off":false};
 export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":[],"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];

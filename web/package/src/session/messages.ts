@@ -16,6 +16,7 @@ import type {
   Problem,
   Progress,
   ProportionRange,
+  ProportionsRequest,
   PullFrame,
   Reading,
   Repair,
@@ -106,6 +107,19 @@ export interface Jobs {
     };
     step: Step;
     output: Uint8Array;
+  };
+  /** Poses the cage of a humanoid by proportions. */
+  proportions: {
+    input: {
+      files: readonly NamedFile[];
+      /** The origin to which the cage is relative. */
+      origin: Float64Array;
+      cage: CageArrays;
+      request: ProportionsRequest;
+      options: BindOptions;
+    };
+    step: Step;
+    output: Float32Array;
   };
   slice: {
     input: { cage: CageArrays; axis: number; fraction: number; options: BindOptions };

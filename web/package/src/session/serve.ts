@@ -148,6 +148,15 @@ function createWork(pkg: Package): Work {
         loaded.free();
       }
     },
+    async proportions({ files, origin, cage, request, options }, step) {
+      const loaded = await read(pkg, files, step);
+      try {
+        loaded.seeFrom(origin);
+        return await binder().proportions(loaded, cage, request, options, step);
+      } finally {
+        loaded.free();
+      }
+    },
     async slice({ cage, axis, fraction, options }, step) {
       const bound = await binder().bindSlice(cage, axis, fraction, options, step);
       return bound?.intoArrays();
