@@ -58,6 +58,9 @@ impl Transition {
     }
 }
 
+/// A pose that factors of proportions made, and the pose with factors of 1. `[n_controls]` each
+pub(crate) type ScaledPose = (Arc<[Vec3]>, Arc<[Vec3]>);
+
 /// All data that can be edited, undone and saved. Clones share their contents.
 #[derive(Clone, Debug, Default)]
 pub struct Document {
@@ -70,7 +73,7 @@ pub struct Document {
     /// Factors of the humanoid's proportions that `pose` contains.
     pub proportions: Proportions,
     /// The last pose that a change of the proportions made, and the same pose with factors of 1.
-    pub(crate) scaled_from: Option<(Arc<[Vec3]>, Arc<[Vec3]>)>,
+    pub(crate) scaled_from: Option<ScaledPose>,
     /// Saved poses, in their order in lists and in the animation.
     pub poses: Arc<Vec<NamedPose>>,
     /// Share of each saved pose in `pose`. `[n_poses]`

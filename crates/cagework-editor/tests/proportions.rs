@@ -25,22 +25,25 @@ static GLB: LazyLock<Vec<u8>> = LazyLock::new(|| {
 
 fn opened(glb: &[u8]) -> Editor {
     let mut editor = Editor::default();
-    editor.open([(Model::read("a.glb", glb, &mut |_| None).unwrap(), None)], Contents::default());
-    let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [4, 8, 2]);
+    editor
+        .open([(Model::read("a.glb", glb, &mut |_| None).expect("valid input"), None)], Contents::default());
+    let mesh = subdivided_box(editor.bounds().expect("valid input"), 0.1, [4, 8, 2]);
     let rings = vec![vec![0, 1, 2]];
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings }).unwrap();
+    editor
+        .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings })
+        .expect("valid input");
     editor.amend();
     editor
 }
 
 fn set(editor: &mut Editor, name: &str, factor: f64) {
-    editor.apply(Command::SetProportion { name: name.to_owned(), factor }).unwrap();
+    editor.apply(Command::SetProportion { name: name.to_owned(), factor }).expect("valid input");
 }
 
 fn pull(editor: &mut Editor) {
     let mut pose = editor.document().pose.to_vec();
     pose[3] += Vec3::new(0.1, 0.2, -0.3);
-    editor.set_pose(pose).unwrap();
+    editor.set_pose(pose).expect("valid input");
 }
 
 fn factors(editor: &Editor) -> [f64; 2] {
