@@ -220,8 +220,8 @@ fn a_pose_that_is_carried_to_another_cage_keeps_its_factors() {
 fn bound(editor: &Editor) -> Arc<BoundModels> {
     let document = editor.document();
     let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
-    let (positions, set) = (document.models.positions(), document.cage.set.as_ref().unwrap());
-    let Binding { weights, frames, .. } = bind(positions, set, &options, &NoProgress).unwrap();
+    let (positions, set) = (document.models.positions(), document.cage.set.as_ref().expect("valid input"));
+    let Binding { weights, frames, .. } = bind(positions, set, &options, &NoProgress).expect("valid input");
     Arc::new(BoundModels::new(document, weights, frames, Vec::new()))
 }
 
