@@ -24,10 +24,15 @@ impl Engine {
     /// The humanoid and a part of its bind, for `Binder.proportionRanges`.
     ///
     /// # Errors
-    /// Before a bind, or if the rig cannot be read.
+    /// Before a bind, or if the models are not a humanoid.
     #[wasm_bindgen(js_name = foldSample, unchecked_return_type = "FoldArrays")]
     pub fn fold_sample(&self) -> Answer<JsValue> {
-        let info = self.state.borrow_mut().editor.humanoid_info();
+        let info = {
+            let editor = &mut self.state.borrow_mut().editor;
+            // Prepare the cage now, so that the first move of a slider does not wait for it.
+            editor.humanoid_cage()?;
+            editor.humanoid_info()
+        };
         let bones = info.into_iter().flat_map(|info| info.bones);
         self.read(|state| {
             let FoldSample { weights, frames, positions, triangles } =
