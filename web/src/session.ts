@@ -316,10 +316,9 @@ async function start(opened: OpenResult & Needs) {
         const [positions, triangles] = engine.modelStates(clip);
         const { smooth } = engine.cageArrays().controls;
         const rig = clip === undefined ? engine.modelRig() : undefined;
-        // Rings along the skeleton enclose the model at rest only.
-        const kind = clip !== undefined && options.kind === "auto" ? "shell" : options.kind;
+        const asked = clip === undefined ? options : pkg.Engine.clipCageOptions(options);
         const model = engine.modelPositions();
-        return { positions, triangles, rig, model, options: { ...options, kind }, smooth };
+        return { positions, triangles, rig, model, options: asked, smooth };
       };
       return ofNow(client.run("cage", input, ({ fraction, skeleton }) => onProgress(fraction, skeleton)));
     },

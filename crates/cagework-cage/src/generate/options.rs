@@ -174,6 +174,13 @@ impl Default for CageOptions {
 }
 
 impl CageOptions {
+    /// Options of a cage around the frames of a clip. Sleeves follow the skeleton at rest only, so [`CageKind::Auto`] is a
+    /// shell.
+    #[must_use]
+    pub fn around_clip(self) -> Self {
+        Self { kind: if self.kind == CageKind::Auto { CageKind::Shell } else { self.kind }, ..self }
+    }
+
     /// Converts [`CageOptions::clearance`] to a distance in object units, for a model with the box `min`..`max`.
     pub(super) fn distance(&self, [min, max]: [DVec3; 2]) -> f64 {
         f64::from(self.clearance) * max.distance(min)

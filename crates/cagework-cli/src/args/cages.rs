@@ -119,13 +119,9 @@ impl CageArgs {
 
     /// Options for generating the cage.
     pub(crate) fn options(&self) -> CageOptions {
-        let kind = match self.kind() {
-            // Sleeves follow the skeleton at rest.
-            KindArg::Auto if self.around_clip.is_some() => CageKind::Shell,
-            kind => kind.generated(),
-        };
+        let kind = self.kind().generated();
         let hull = kind == CageKind::Hull;
-        CageOptions {
+        let options = CageOptions {
             target: self.vertices.unwrap_or(if hull { HULL_TARGET } else { CageOptions::default().target }),
             detail: self.detail,
             quads: !self.triangles,
@@ -135,7 +131,8 @@ impl CageArgs {
             clearance: self.clearance,
             voxels: self.voxels,
             smooth: self.smooth.smooth,
-        }
+        };
+        if self.around_clip.is_some() { options.around_clip() } else { options }
     }
 }
 

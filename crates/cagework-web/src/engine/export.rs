@@ -1,5 +1,6 @@
 //! Methods that write files and return arrays of the models.
 
+use cagework_cage::CageOptions;
 use cagework_editor::{BoundError, Exported, SharedClip};
 use cagework_io::write_zip;
 use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
@@ -182,6 +183,18 @@ impl Engine {
         let positions = Float32Array::from(flat(&positions).as_slice());
         let triangles = Uint32Array::from(triangles.as_flattened());
         Ok(Array::of2(&positions, &triangles).into())
+    }
+
+    /// Options of a cage around the frames of a clip.
+    ///
+    /// # Errors
+    /// If the options are not valid.
+    #[wasm_bindgen(js_name = clipCageOptions, unchecked_return_type = "CageOptions")]
+    pub fn clip_cage_options(
+        #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
+    ) -> Answer<JsValue> {
+        let options: CageOptions = decode(options)?;
+        Ok(object(&options.around_clip()))
     }
 
     /// Joints of all models at rest, for the positions that [`Self::model_states`] returns without a clip; undefined
