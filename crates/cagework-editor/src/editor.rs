@@ -403,7 +403,7 @@ impl Editor {
             return Err(EditError::NotFinite { what: "positions" });
         }
         if *self.document.pose != *positions {
-            self.document.pose = positions.into();
+            self.document.replace_pose(positions.into());
         }
         Ok(())
     }

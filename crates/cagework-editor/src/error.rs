@@ -90,12 +90,6 @@ pub enum EditError {
     /// A proportion cannot be set.
     #[error(transparent)]
     Proportion(#[from] ProportionError),
-    /// No preset of proportions has the name.
-    #[error("there is no such preset; there are {known}")]
-    NoPreset {
-        /// Names of the presets.
-        known: String,
-    },
     /// The rig cannot be read.
     #[error(transparent)]
     Rig(#[from] WriteError),

@@ -3,6 +3,7 @@
 //! A change of the factors displaces the pose by the difference of two cages at rest: the one with the new factors minus
 //! the one with the old factors. So pulled vertices keep their displacement, and factors of 1 give the pulled pose.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cagework_core::options::Choice;
@@ -186,10 +187,7 @@ impl Editor {
 
     /// Sets the factors of a preset; the others become 1.
     pub(crate) fn set_preset(&mut self, name: &str) -> Result<(), EditError> {
-        let preset = PRESETS.iter().find(|preset| preset.name == name);
-        let known = || PRESETS.map(|preset| preset.name).join(", ");
-        let next = preset.ok_or_else(|| EditError::NoPreset { known: known() })?.proportions()?;
-        self.set_proportions(next)
+        self.set_proportions(Proportions::of(Some(name), &BTreeMap::new())?)
     }
 
     /// Gives the right side the factors of the left side.
@@ -220,6 +218,16 @@ impl Editor {
         let before = self.humanoid_cage().ok();
         let own = before.as_ref().map(|cage| self.document().without_proportions(cage));
         let mut next = self.document().clone();
+        // A joint that is another bone is exchanged with it.
+        if let (Some(joint), Ok(humanoid)) = (&joint, self.humanoid_of(&next)) {
+            let rig = next.models.rest_rig().unwrap_or_default();
+            let named = humanoid.named(&rig);
+            let of =
+                |bone: Bone| named.iter().find(|found| found.bone == bone).map(|found| found.joint.clone());
+            if let Some(other) = named.iter().find(|found| found.joint == *joint && found.bone != bone) {
+                next.models.set_bone(other.bone, of(bone));
+            }
+        }
         next.models.set_bone(bone, joint);
         match self.humanoid_of(&next) {
             // Several bones of an unknown skeleton are named one after the other.
@@ -244,6 +252,22 @@ impl Editor {
 }
 
 impl Document {
+    /// Replaces the pose. The pose without factors moves by the same displacement, so that factors of 1 give it exactly,
+    /// also after another bind.
+    pub(crate) fn replace_pose(&mut self, pose: Arc<[Vec3]>) {
+        if let Some((scaled, own)) =
+            self.scaled_from.take().filter(|(scaled, _)| Arc::ptr_eq(scaled, &self.pose))
+            && self.proportions != Proportions::default()
+        {
+            let moved = |((own, new), old): ((&Vec3, &Vec3), &Vec3)| {
+                (own.as_dvec3() + (new.as_dvec3() - old.as_dvec3())).as_vec3()
+            };
+            let own = own.iter().zip(&*pose).zip(&*scaled).map(moved).collect();
+            self.scaled_from = Some((Arc::clone(&pose), own));
+        }
+        self.pose = pose;
+    }
+
     /// The pose without its factors, object units. `[n_controls]`
     fn without_proportions(&self, cage: &HumanoidCage) -> Arc<[Vec3]> {
         if self.proportions == Proportions::default() {

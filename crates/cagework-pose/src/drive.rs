@@ -18,14 +18,16 @@ const RING_SHARE: f64 = 0.4;
 const END_FROM: f64 = 0.05;
 /// Weights of hands, feet and head above this make a vertex follow that bone only.
 const END_FULL: f64 = 0.5;
-/// Vertices whose weights for bones are less than this together give no weights.
+/// Vertices of the model whose weights sum to at most this are ignored.
 const LEAST: f64 = 0.5;
+/// Limit on the distances that are computed. With more vertices, every second, third and so on is taken.
+const MAX_DISTANCES: usize = 1 << 28;
 
 /// Weights of the bones at each vertex of a cage; each row sums to 1. `[n_cage][N_BONES]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoneWeights(Vec<[f64; N_BONES]>);
 
-/// Bones of which each vertex of the model has weights. `[n_vertices][N_BONES]`
+/// Weight of each bone at each vertex of the model. `[n_vertices][N_BONES]`
 pub(crate) fn skin_of_bones(rig: &Rig, humanoid: &Humanoid) -> Vec<[f64; N_BONES]> {
     let bones = humanoid.bones_of_joints(rig);
     let row = |range: &[u32]| {
@@ -61,6 +63,8 @@ impl BoneWeights {
         let total = |row: &[f64; N_BONES]| row.iter().sum::<f64>();
         let skinned: Vec<usize> =
             (0..skin.len().min(positions.len())).filter(|&v| total(&skin[v]) > LEAST).collect();
+        let step = (cage.len().saturating_mul(skinned.len()) / MAX_DISTANCES).max(1);
+        let skinned: Vec<usize> = skinned.into_iter().step_by(step).collect();
         let mut weights: Vec<[f64; N_BONES]> = cage
             .iter()
             .map(|at| {
@@ -207,14 +211,15 @@ fn normalized(mut row: [f64; N_BONES]) -> [f64; N_BONES] {
 
 /// Row with larger weights of the bones that keep their shape.
 fn with_ends(mut row: [f64; N_BONES]) -> [f64; N_BONES] {
-    for end in ENDS {
+    let shares = ENDS.map(|end| {
         let own: f64 = end.iter().map(|bone| row[*bone as usize]).sum();
         let t = ((own - END_FROM) / (END_FULL - END_FROM)).clamp(0.0, 1.0);
-        let share = t * t * (3.0 - 2.0 * t);
-        if share > 0.0 {
-            row.iter_mut().for_each(|w| *w *= 1.0 - share);
-            row[end[0] as usize] += share;
-        }
+        t * t * (3.0 - 2.0 * t)
+    });
+    let total: f64 = shares.iter().sum();
+    row.iter_mut().for_each(|w| *w *= 1.0 - total.min(1.0));
+    for (end, share) in ENDS.iter().zip(shares) {
+        row[end[0] as usize] += share / total.max(1.0);
     }
     row
 }

@@ -1,8 +1,7 @@
 //! Keeps the shape of hands, feet and head when a cage is posed.
 //!
-//! Few vertices of a cage lie at a chin or an ankle, and they follow the neck and the shin, too. So the pose is corrected:
-//! of all poses near the given one, the one is taken that brings the vertices of hands, feet and head closest to their
-//! images, by least squares.
+//! Few vertices of a cage lie at a chin or an ankle, and they follow the neck and the shin, too. So the pose is corrected
+//! by regularised least squares: the vertices of hands, feet and head come close to their images.
 
 use cagework_core::rig::Rig;
 use cagework_core::weights::Weights;
@@ -18,6 +17,8 @@ const OF_END: f64 = 0.95;
 const PER_END: usize = 256;
 /// Number of the other vertices that count.
 const OTHERS: usize = 1024;
+/// Cages with more controls are not corrected: the matrix has as many rows and columns.
+const MAX_CONTROLS: usize = 1000;
 /// Weight of the squared moves of other vertices against those of the ends.
 const STAY: f64 = 0.05;
 /// Weight of the squared moves of the cage's vertices, against the mean weight of a cage vertex.
@@ -37,7 +38,7 @@ pub(crate) struct EndFit {
 impl EndFit {
     /// Prepares the correction. `weights`: bind of the model, with one row per vertex and more rows of other points,
     /// and with one column per control and more columns of frames. `None` if the model has no vertices of hands, feet
-    /// and head.
+    /// and head, or the cage has more than 1000 controls.
     pub(crate) fn new(
         n_controls: usize,
         weights: &Weights,
@@ -45,6 +46,9 @@ impl EndFit {
         rig: &Rig,
         humanoid: &Humanoid,
     ) -> Option<Self> {
+        if n_controls > MAX_CONTROLS {
+            return None;
+        }
         let skin = skin_of_bones(rig, humanoid);
         let n = skin.len().min(positions.len()).min(weights.n_rows());
         let mut rows = Vec::new();

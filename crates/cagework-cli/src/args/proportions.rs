@@ -21,12 +21,12 @@ use super::{CageSource, ModelOutput, ReadArgs, RigArgs, SolveArgs, mesh_help, nu
     after_help = "The bones are those that a VRM names, or those whose joints have usual names, or else the legs, arms \
     and head that the shape of the skeleton shows. The summary lists them; --bone changes one.\n\n\
     The lowest point of the model, and of each clip, keeps its height. Clothes of the same body follow with `cagework \
-    refit`, which takes the files of --save-cage and --pose-out.\n\n\
+    refit`, if --cage gives a cage around body and clothes and --pose-out writes its pose.\n\n\
     Examples:\n  \
     cagework proportions avatar.vrm --leg 1.2 --head 1.15 -o tall.vrm\n  \
     cagework proportions avatar.vrm --preset chibi --left arm=0.8 -o chibi.vrm\n  \
     cagework proportions body.glb --leg 1.2 --save-cage cage.obj --pose-out tall.obj\n  \
-    cagework proportions robot.glb --bone leftHand=Grip_L --arm 1.2 -o robot2.glb\n  \
+    cagework proportions golem.glb --bone leftHand=Grip_L --arm 1.2 -o golem2.glb\n  \
     cagework proportions --presets"
 )]
 #[command(group = clap::ArgGroup::new("result").required(true).multiple(true).args(["output", "pose_out", "ranges", "presets"]))]
@@ -38,7 +38,7 @@ pub(crate) struct ProportionsArgs {
     pub(crate) read: ReadArgs,
     #[command(flatten)]
     pub(crate) factors: FactorArgs,
-    /// Joint of a humanoid bone, if it is not found; the bones have the names of VRM 1.0. May be given several times.
+    /// Joint of a humanoid bone that is not found or wrong. Bones are named as in VRM 1.0. May be given several times.
     #[arg(long, value_name = "BONE=JOINT", value_parser = bone)]
     pub(crate) bone: Vec<(Bone, String)>,
     /// Cage: a file; auto or auto:VERTICES for a cage that follows the mesh; hull:VERTICES or box:DIVISIONS.

@@ -17,8 +17,10 @@ fn files() -> Sandbox {
     for name in ["horse", "shirt", "body", "jacket", "trousers", "boots", "saddle"] {
         sandbox.write(&format!("{name}.glb"), &horse);
     }
-    sandbox
-        .write("fox.glb", write_mesh_glb("fox", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap());
+    for name in ["fox.glb", "avatar.vrm"] {
+        let rigged = write_mesh_glb(name, &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
+        sandbox.write(name, rigged);
+    }
     sandbox.run("cage horse.glb -o cage.obj").success();
     sandbox.run("cage fox.glb -o fox-cage.obj").success();
     sandbox.run("bind horse.glb --cage cage.obj -g 16 --weights horse.npz").success();

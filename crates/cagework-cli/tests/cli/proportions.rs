@@ -62,7 +62,7 @@ fn wrong_factors_and_models_are_refused() {
         sandbox.run(&format!("proportions humanoid.glb {line} -o out.glb")).failure().stderr(contains(part));
     };
     refused("--leg 3", "from 0.5 to 2");
-    refused("--left head=1.2", "no proportion \"left_head\"");
+    refused("--left head=1.2", "head has no sides");
     refused("--left arm", "expected NAME=FACTOR");
     refused("--bone leftClaw=x", "leftClaw");
     refused("--bone leftHand=Claw", "there is no joint \"Claw\"");

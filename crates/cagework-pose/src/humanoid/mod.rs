@@ -132,7 +132,7 @@ pub struct BoneJoint {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HumanoidError {
     /// The model has no joints.
-    #[error("the model has no skeleton whose bones could be scaled: pull its cage instead")]
+    #[error("the model has no skeleton: pull its cage instead")]
     NoRig,
     /// The arrays of the rig contradict each other.
     #[error("the rig is not valid: {0}")]
@@ -223,7 +223,8 @@ impl Humanoid {
             })
         };
         let of_shape = || shape::find(rig).map(with_given).filter(agrees);
-        let (joints, source) = if missing(&of_vrm).is_empty() {
+        let has_vrm = rig.joints.iter().any(|joint| joint.bone.is_some());
+        let (joints, source) = if has_vrm && missing(&of_vrm).is_empty() {
             (of_vrm, BoneSource::Vrm)
         } else if missing(&of_names).is_empty() {
             (of_names, BoneSource::Names)
@@ -277,8 +278,13 @@ impl Humanoid {
                 *own = Some(bone);
             }
         }
-        let of = |joint: usize| ancestors(rig, joint).find_map(|at| own[at]);
-        (0..rig.joints.len()).map(of).collect()
+        // Parents first, so that each joint is visited once.
+        for joint in by_depth(rig) {
+            let above =
+                rig.joints[joint].parent.and_then(|parent| own.get(parent as usize).copied().flatten());
+            own[joint] = own[joint].or(above);
+        }
+        own
     }
 }
 
@@ -300,9 +306,9 @@ fn check(rig: &Rig) -> Result<(), HumanoidError> {
     if rig.joints.iter().any(|joint| !joint.at.is_finite()) {
         return Err(HumanoidError::Rig("the position of a joint is not finite"));
     }
-    let is_tree = |joint| ancestors(rig, joint).take(n + 1).count() <= n;
+    // A walk over the children of all roots visits every joint unless some form a circle.
     if rig.joints.iter().any(|joint| joint.parent.is_some_and(|parent| parent as usize >= n))
-        || !(0..n).all(is_tree)
+        || by_depth(rig).len() != n
     {
         return Err(HumanoidError::Rig("the parents of the joints do not form a tree"));
     }
@@ -314,9 +320,27 @@ fn ancestors(rig: &Rig, joint: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(Some(joint), |&at| rig.joints.get(at)?.parent.map(|parent| parent as usize))
 }
 
-/// Number of joints above each joint. `[n_joints]`
-fn depths(rig: &Rig) -> Vec<usize> {
-    (0..rig.joints.len()).map(|joint| ancestors(rig, joint).count() - 1).collect()
+/// Joints from the roots downwards, those of equal depth in their order in the rig.
+fn by_depth(rig: &Rig) -> Vec<usize> {
+    let mut children = vec![Vec::new(); rig.joints.len()];
+    let mut level = Vec::new();
+    for (k, joint) in rig.joints.iter().enumerate() {
+        match joint.parent {
+            None => level.push(k),
+            Some(parent) => {
+                if let Some(children) = children.get_mut(parent as usize) {
+                    children.push(k);
+                }
+            }
+        }
+    }
+    let mut all = Vec::with_capacity(rig.joints.len());
+    while !level.is_empty() {
+        level.sort_unstable();
+        all.extend(&level);
+        level = level.iter().flat_map(|joint| children[*joint].iter().copied()).collect();
+    }
+    all
 }
 
 /// Bones that the file's VRM data names.

@@ -1,11 +1,11 @@
 //! Humanoid bones by the names of the joints.
 //!
-//! The names are those of Mixamo, VRoid, Unreal, Rigify, Blender, Unity, MMD, 3ds Max, Valve, Character Creator, Daz,
+//! The names are those of Mixamo, VRoid, Unreal, Rigify, Blender, Unity, VRChat, MMD, 3ds Max, Valve, Character Creator, Daz,
 //! ARKit, Quaternius and KayKit.
 
 use cagework_core::rig::Rig;
 
-use super::{Bone, Joints, N_BONES, ancestors, depths};
+use super::{Bone, Joints, N_BONES, ancestors, by_depth};
 
 /// Part of the body without its side.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -69,7 +69,7 @@ const FILLERS: [&str; 18] = [
 /// Parts of a name that mark helper joints.
 const HELPERS: [&str; 8] = ["ik", "pole", "target", "twist", "roll", "ctrl", "control", "slot"];
 
-/// Spine joints from which on the last one is the head (Rigify).
+/// Least number of joints with the name "spine" of which the last one is the head (Rigify).
 const SPINE_WITH_HEAD: usize = 5;
 
 /// Side and words of a joint's name.
@@ -136,11 +136,8 @@ fn part_of(name: &str) -> Option<Part> {
 
 /// Finds bones by the names of the joints; of several joints with names of one bone, the closest to the root.
 pub(super) fn find(rig: &Rig) -> Joints {
-    let depths = depths(rig);
-    let mut order: Vec<usize> = (0..rig.joints.len()).collect();
-    order.sort_by_key(|&joint| depths[joint]);
     let names: Vec<(usize, Name)> =
-        order.into_iter().map(|joint| (joint, Name::of(&rig.joints[joint].name))).collect();
+        by_depth(rig).into_iter().map(|joint| (joint, Name::of(&rig.joints[joint].name))).collect();
     let has = |side: Option<usize>, part: Part| {
         names.iter().any(|(_, name)| {
             name.side == side && part_of(name.bare()).or_else(|| part_of(&name.core)) == Some(part)

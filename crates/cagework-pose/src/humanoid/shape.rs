@@ -11,6 +11,8 @@ const EQUAL: f64 = 0.06;
 const CLOSE: f64 = 0.02;
 /// Least length of a limb, as a fraction of the skeleton's size.
 const LIMB: f64 = 0.15;
+/// A first bone shorter than this share of the next one is a collarbone.
+const COLLARBONE: f64 = 0.7;
 /// The ankle is the first joint below this share of the leg's height.
 const ANKLE: f64 = 0.25;
 
@@ -143,9 +145,11 @@ pub(super) fn find(rig: &Rig) -> Option<Joints> {
             set(Bone::Chest, chest);
         }
     }
-    // The toes point forwards, and left is at the left hand of who looks there.
-    let forward: f64 = legs.iter().filter_map(|leg| Some((tree.at[*leg.get(3)?] - tree.at[leg[2]]).z)).sum();
-    let is_left = |p: DVec3| (p - middle).x * if forward < 0.0 { -1.0 } else { 1.0 } > 0.0;
+    // Toes point forwards; left is the figure's own left.
+    let toes = legs.iter().filter_map(|leg| Some(tree.at[*leg.get(3)?] - tree.at[leg[2]]));
+    let forward = DVec3 { y: 0.0, ..toes.sum() };
+    let forward = if forward == DVec3::ZERO { DVec3::Z } else { forward };
+    let is_left = |p: DVec3| (p - middle).dot(DVec3::Y.cross(forward)) > 0.0;
     for leg in &legs {
         let side = usize::from(!is_left(tree.at[leg[0]]));
         set([Bone::LeftUpperLeg, Bone::RightUpperLeg][side], leg[0]);
@@ -212,15 +216,17 @@ fn leg(tree: &Tree, rig: &Rig, top: usize, ground: f64) -> Option<Vec<usize>> {
     Some(leg)
 }
 
-/// Arm, forearm and hand of a chain that begins at `top`. The hand is where fingers branch off, or else the third of up
-/// to four joints.
+/// Arm, forearm and hand of a chain that begins at `top`. The hand is where fingers branch off. Without fingers it is the
+/// third joint, or the fourth if the first bone is short: a collarbone.
 fn arm(tree: &Tree, rig: &Rig, top: usize, aside: impl Fn(DVec3) -> f64) -> Option<[usize; 3]> {
     let path = tree.path(rig, top, tree.extreme(top, aside));
     let is_long =
         |joint: &usize| tree.at[tree.extreme(*joint, |p| p.distance(tree.at[*joint]))] != tree.at[*joint];
     let branches = |joint: usize| tree.children[joint].iter().filter(|child| is_long(child)).count() >= 2;
     let fingers = (2..path.len()).find(|&k| branches(path[k]));
-    let hand = fingers.unwrap_or(if path.len() > 3 { 3 } else { 2 });
+    let length = |k: usize| Some(tree.at[*path.get(k)?].distance(tree.at[*path.get(k + 1)?]));
+    let is_collarbone = path.len() > 3 && length(0) < length(1).map(|length| COLLARBONE * length);
+    let hand = fingers.unwrap_or(if is_collarbone { 3 } else { 2 });
     let [arm, forearm, hand] = path.get(hand.checked_sub(2)?..=hand)? else { return None };
     Some([*arm, *forearm, *hand])
 }

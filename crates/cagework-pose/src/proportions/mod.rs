@@ -69,8 +69,6 @@ const N: usize = <Proportion as Choice>::ALL.len();
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct ProportionFacts {
-    /// Title of its slider.
-    pub title: &'static str,
     /// Meaning, for help.
     pub help: &'static str,
     /// Title of its group of sliders.
@@ -85,21 +83,21 @@ impl Proportion {
     /// What is fixed about the proportion.
     #[must_use]
     pub const fn facts(self) -> ProportionFacts {
-        let (title, help, group, is_sided, natural) = match self {
-            Self::Leg => ("Legs", "Length of the legs, without the feet", LIMBS, true, [0.6, 1.4]),
-            Self::Arm => ("Arms", "Length of the arms, without the hands", LIMBS, true, [0.7, 1.3]),
-            Self::Limb => ("Thickness", "Thickness of arms and legs", LIMBS, true, [0.75, 1.4]),
-            Self::Hand => ("Hands", "Size of the hands", LIMBS, true, [0.7, 1.4]),
-            Self::Foot => ("Feet", "Size of the feet", LIMBS, true, [0.7, 1.4]),
-            Self::Torso => ("Torso", "Height of the trunk from hips to shoulders", TRUNK, false, [0.75, 1.3]),
-            Self::Shoulder => ("Shoulders", "Distance between the shoulders", TRUNK, false, [0.8, 1.3]),
-            Self::Waist => ("Waist", "Width of the waist", TRUNK, false, [0.75, 1.4]),
-            Self::Hip => ("Hips", "Width of the hips", TRUNK, false, [0.85, 1.2]),
-            Self::Head => ("Head", "Size of the head", WHOLE, false, [0.8, 1.8]),
-            Self::Neck => ("Neck", "Length of the neck", WHOLE, false, [0.5, 2.0]),
-            Self::Height => ("Height", "Size of the whole figure", WHOLE, false, [0.5, 2.0]),
+        let (help, group, is_sided, natural) = match self {
+            Self::Leg => ("Length of the legs, without the feet", LIMBS, true, [0.6, 1.4]),
+            Self::Arm => ("Length of the arms, without the hands", LIMBS, true, [0.7, 1.3]),
+            Self::Limb => ("Thickness of arms and legs", LIMBS, true, [0.75, 1.4]),
+            Self::Hand => ("Size of the hands", LIMBS, true, [0.7, 1.4]),
+            Self::Foot => ("Size of the feet", LIMBS, true, [0.7, 1.4]),
+            Self::Torso => ("Height of the trunk from hips to shoulders", TRUNK, false, [0.75, 1.3]),
+            Self::Shoulder => ("Distance between the shoulders", TRUNK, false, [0.8, 1.3]),
+            Self::Waist => ("Width of the waist", TRUNK, false, [0.75, 1.4]),
+            Self::Hip => ("Width of the hips", TRUNK, false, [0.85, 1.2]),
+            Self::Head => ("Size of the head", WHOLE, false, [0.8, 1.8]),
+            Self::Neck => ("Length of the neck", WHOLE, false, [0.5, 2.0]),
+            Self::Height => ("Size of the whole figure", WHOLE, false, [0.5, 2.0]),
         };
-        ProportionFacts { title, help, group, is_sided, natural }
+        ProportionFacts { help, group, is_sided, natural }
     }
 }
 
@@ -125,12 +123,18 @@ impl Default for Proportions {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ProportionError {
     /// No proportion has the name.
-    #[error("there is no proportion {name:?}; there are {known}, and left_ or right_ before {sided}")]
+    #[error("there is no proportion {name:?}; there are {known}")]
     Unknown {
-        /// The given name, shortened.
+        /// The given name without its side, shortened.
         name: String,
         /// All names.
         known: String,
+    },
+    /// A factor of one side is given for a proportion without sides.
+    #[error("{name} has no sides: give one factor; those with sides are {sided}")]
+    NoSides {
+        /// Name of the proportion.
+        name: &'static str,
         /// Names of those with two sides.
         sided: String,
     },
@@ -185,19 +189,16 @@ impl Proportions {
     pub fn set(&mut self, name: &str, factor: f64) -> Result<(), ProportionError> {
         let sided = |prefix, side| name.strip_prefix(prefix).map(|rest| (rest, Some(side)));
         let (bare, side) = sided("left_", 0).or(sided("right_", 1)).unwrap_or((name, None));
-        let found = Proportion::ALL.iter().find(|(word, _)| *word == bare).map(|(_, proportion)| *proportion);
-        let Some(proportion) = found.filter(|proportion| side.is_none() || proportion.facts().is_sided)
-        else {
-            let words = |only_sided: bool| {
-                let kept = Proportion::ALL.iter().filter(|(_, p)| !only_sided || p.facts().is_sided);
-                kept.map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
-            };
-            return Err(ProportionError::Unknown {
-                name: shortened(name),
-                known: words(false),
-                sided: words(true),
-            });
+        let words = |is_listed: fn(Proportion) -> bool| {
+            let kept = Proportion::ALL.iter().filter(|(_, proportion)| is_listed(*proportion));
+            kept.map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
         };
+        let Some(&(word, proportion)) = Proportion::ALL.iter().find(|(word, _)| *word == bare) else {
+            return Err(ProportionError::Unknown { name: shortened(bare), known: words(|_| true) });
+        };
+        if side.is_some() && !proportion.facts().is_sided {
+            return Err(ProportionError::NoSides { name: word, sided: words(|p| p.facts().is_sided) });
+        }
         let wrong = |error| ProportionError::Range { name: name.to_owned(), error };
         FACTOR.check(factor).map_err(wrong)?;
         let factors = &mut self.0[proportion as usize];
@@ -323,7 +324,7 @@ const CHIN: f64 = 0.08;
 const HEAD_OUTLIERS: f64 = 0.03;
 /// Vertices whose weight for the head is above this belong to the head.
 const OF_HEAD: f64 = 0.5;
-/// Share of the neck in the growth of the head's girth.
+/// The girth of the neck at the head grows by this share of the square root of the head's factor.
 const NECK_SHARE: f64 = 0.6;
 /// Cage vertices with more than this weight for one leg stay on its side of the middle plane.
 const OF_LEG: f64 = 0.5;
@@ -335,7 +336,7 @@ const FOLDED_AREA: f64 = 1e-4;
 const FACTORS_DOWN: [f64; 5] = [0.9, 0.8, 0.7, 0.6, 0.5];
 const FACTORS_UP: [f64; 6] = [1.1, 1.2, 1.35, 1.5, 1.75, 2.0];
 
-/// Factors of a proportion between which no part of the model folds.
+/// Factors of a proportion between which the surface of the model does not fold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct ProportionRange {
@@ -465,10 +466,11 @@ impl HumanoidCage {
             ends.correct(&self.rest, &mut posed, &maps);
         }
         let (legs, feet) = (self.shares(|leg| leg), self.shares(|leg| &leg[2..]));
+        let clearance = LEG_CLEARANCE * self.height();
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             for (v, p) in posed.iter_mut().enumerate().filter(|(v, _)| legs[side][*v] > OF_LEG) {
                 let rest = sign * frame.aside(self.rest[v].as_dvec3());
-                let least = rest.min(LEG_CLEARANCE * self.height());
+                let least = rest.min(clearance);
                 *p += (least - sign * frame.aside(*p)).max(0.0) * sign * frame.left;
             }
         }
@@ -486,10 +488,10 @@ impl HumanoidCage {
         posed.iter().map(|p| (base + factor * (*p + lift * frame.up - base)).as_vec3()).collect()
     }
 
-    /// Ranges of factors within which less than 0.01 % of the model's area folds, for both sides together.
+    /// Ranges of factors within which at most 0.01 % of the model's area folds, for both sides together.
     ///
-    /// A triangle is folded if its normal turns by more than 90 degrees: the maps stretch and do not rotate. Every factor
-    /// of a range is one of eleven steps from 0.5 to 2.
+    /// A triangle is folded if its normal turns by more than 90 degrees: the maps stretch and do not rotate. The factors
+    /// are tried in steps from 1 down to 0.5 and up to 2; a range ends at the last step without folds.
     ///
     /// `weights`, `frames`: bind of the vertices to the controls. `positions`, `triangles`: the model, object units.
     ///

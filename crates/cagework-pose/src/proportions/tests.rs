@@ -189,7 +189,7 @@ fn proportions_are_named_factors() {
     for (wrong, part) in [
         (("leg", 3.0), "leg: factor is 3; it must be a number from 0.5 to 2"),
         (("tail", 1.0), "no proportion \"tail\""),
-        (("left_head", 1.0), "no proportion \"left_head\""),
+        (("left_head", 1.0), "head has no sides"),
     ] {
         let error = parse(&[wrong]).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");

@@ -29,7 +29,7 @@ export const proportions = {
   right: (part: string) => `${part}, right`,
   apart: "Left and right apart",
   resetAll: "Reset all",
-  resetTip: "All proportions to 100 %. A double click on a slider resets it alone.",
+  resetTip: "All proportions to 100 %. A double click on a slider resets only that slider.",
   folds: (parts: string) => `Beyond the red mark the model folds: ${parts}`,
   bones: "Bones",
   unknown: "No proportions: unknown skeleton",
