@@ -18,9 +18,9 @@ use crate::edit::{
 };
 use crate::error::EditError;
 use crate::history::History;
+use crate::humanoid::{HumanoidCache, HumanoidInfo};
 use crate::models::{Models, NewModel};
 use crate::options::{PROPORTIONAL_RADIUS, Tools};
-use crate::proportions::{HumanoidCache, HumanoidInfo};
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};

@@ -19,7 +19,9 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::EditError;
-use crate::proportions::GivenBones;
+
+/// Bones and the names of their joints that the user has given.
+pub(crate) type GivenBones = Arc<Vec<(Bone, String)>>;
 
 /// Largest number that is accepted from a project for the first triangle of a model. The limit leaves room for the
 /// triangles of models that are opened later.
