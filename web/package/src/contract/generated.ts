@@ -1098,7 +1098,7 @@ delta: number | null, };
  */
 export type Proportion = "leg" | "arm" | "torso" | "neck" | "head" | "hand" | "foot" | "shoulder" | "hip" | "limb" | "waist" | "height";
 /**
- * Factors of a proportion between which no part of the model folds.
+ * Factors of a proportion between which the surface of the model does not fold.
  */
 export type ProportionRange = {
 /**
