@@ -249,3 +249,10 @@ fn captures_survive_in_projects() {
         assert_eq!(again.splats(), model.splats());
     }
 }
+
+#[test]
+fn the_project_among_the_samples_of_the_page_is_read() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/public/samples/wardrobe.glb");
+    let bytes = std::fs::read(path).unwrap();
+    assert!(read_project("wardrobe.glb", &bytes, u64::MAX).unwrap().is_some());
+}
