@@ -58,8 +58,13 @@ impl Transition {
     }
 }
 
-/// A pose that factors of proportions made, and the pose with factors of 1. `[n_controls]` each
-pub(crate) type ScaledPose = (Arc<[Vec3]>, Arc<[Vec3]>);
+/// A pose that contains factors of proportions, and the same pose with factors of 1. `[n_controls]` each
+#[derive(Clone, Debug)]
+pub(crate) struct ScaledPose {
+    pub(crate) factors: Proportions,
+    pub(crate) pose: Arc<[Vec3]>,
+    pub(crate) own: Arc<[Vec3]>,
+}
 
 /// All data that can be edited, undone and saved. Clones share their contents.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +77,7 @@ pub struct Document {
     pub pose: Arc<[Vec3]>,
     /// Factors of the humanoid's proportions that `pose` contains.
     pub proportions: Proportions,
-    /// The last pose that a change of the proportions made, and the same pose with factors of 1.
+    /// `pose` with and without its factors, if a change of the proportions made it.
     pub(crate) scaled_from: Option<ScaledPose>,
     /// Saved poses, in their order in lists and in the animation.
     pub poses: Arc<Vec<NamedPose>>,

@@ -12,7 +12,7 @@ use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
 use crate::controls::RestCage;
-use crate::document::{Document, Key, NamedPose, Transition, cage_id};
+use crate::document::{Document, Key, NamedPose, ScaledPose, Transition, cage_id};
 use crate::edit::{
     Constraint, Element, Gesture, GestureKind, Pull, SelectMode, Selection, SharedPull, Topology,
 };
@@ -411,7 +411,7 @@ impl Editor {
     /// Sets the pose that factors make of `own`, the pose with factors of 1. `[n_controls]` each
     pub(crate) fn set_scaled_pose(&mut self, factors: Proportions, own: Arc<[Vec3]>, pose: Arc<[Vec3]>) {
         self.document.proportions = factors;
-        self.document.scaled_from = Some((Arc::clone(&pose), own));
+        self.document.scaled_from = Some(ScaledPose { factors, pose: Arc::clone(&pose), own });
         self.document.pose = pose;
     }
 

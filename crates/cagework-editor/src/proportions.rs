@@ -13,7 +13,7 @@ use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, Proportion, Prop
 use glam::{DVec3, Vec3};
 
 use crate::bound::{BoundDocument, BoundError};
-use crate::document::Document;
+use crate::document::{Document, ScaledPose};
 use crate::editor::Editor;
 use crate::error::EditError;
 
@@ -77,10 +77,9 @@ impl Editor {
         if let (Some(joint), Ok(humanoid)) = (&joint, self.humanoid_of(&next)) {
             let rig = next.models.rest_rig().unwrap_or_default();
             let named = humanoid.named(&rig);
-            let of =
-                |bone: Bone| named.iter().find(|found| found.bone == bone).map(|found| found.joint.clone());
+            let before = named.iter().find(|found| found.bone == bone).map(|found| found.joint.clone());
             if let Some(other) = named.iter().find(|found| found.joint == *joint && found.bone != bone) {
-                next.models.set_bone(other.bone, of(bone));
+                next.models.set_bone(other.bone, before);
             }
         }
         next.models.set_bone(bone, joint);
@@ -110,17 +109,22 @@ impl Document {
     /// Replaces the pose. The pose without factors moves by the same displacement, so that factors of 1 give it exactly,
     /// also after another bind.
     pub(crate) fn replace_pose(&mut self, pose: Arc<[Vec3]>) {
-        if let Some((scaled, own)) =
-            self.scaled_from.take().filter(|(scaled, _)| Arc::ptr_eq(scaled, &self.pose))
-            && self.proportions != Proportions::default()
-        {
+        let known = self.scaled_pose().cloned();
+        self.scaled_from = known.map(|ScaledPose { factors, pose: before, own }| {
             let moved = |((own, new), old): ((&Vec3, &Vec3), &Vec3)| {
                 (own.as_dvec3() + (new.as_dvec3() - old.as_dvec3())).as_vec3()
             };
-            let own = own.iter().zip(&*pose).zip(&*scaled).map(moved).collect();
-            self.scaled_from = Some((Arc::clone(&pose), own));
-        }
+            let own = own.iter().zip(&*pose).zip(&*before).map(moved).collect();
+            ScaledPose { factors, pose: Arc::clone(&pose), own }
+        });
         self.pose = pose;
+    }
+
+    /// The pose with and without its factors, if both are known.
+    fn scaled_pose(&self) -> Option<&ScaledPose> {
+        let is_current =
+            |known: &&ScaledPose| known.factors == self.proportions && Arc::ptr_eq(&known.pose, &self.pose);
+        self.scaled_from.as_ref().filter(is_current)
     }
 
     /// The pose without its factors, object units. `[n_controls]`
@@ -128,9 +132,8 @@ impl Document {
         if self.proportions == Proportions::default() {
             return Arc::clone(&self.pose);
         }
-        let known = self.scaled_from.as_ref().filter(|(scaled, _)| Arc::ptr_eq(scaled, &self.pose));
-        if let Some((_, own)) = known {
-            return Arc::clone(own);
+        if let Some(known) = self.scaled_pose() {
+            return Arc::clone(&known.own);
         }
         let rest = &self.cage.mesh.positions;
         let scaled = cage.pose(&self.proportions);

@@ -106,6 +106,18 @@ fn a_drag_of_a_slider_is_one_step_that_undoes_factors_and_pose() {
     assert!(!editor.document().is_posed());
 }
 
+/// The factors of a saved pose are removed from it, not those of the pose before.
+#[test]
+fn a_pose_that_is_applied_on_other_factors_loses_its_own_at_a_reset() {
+    let mut editor = opened(&GLB);
+    set(&mut editor, "leg", 1.2);
+    editor.apply(Command::SavePose { name: "long".to_owned() }).unwrap();
+    set(&mut editor, "leg", 1.5);
+    editor.apply(Command::ApplyPose { index: 0 }).unwrap();
+    set(&mut editor, "leg", 1.0);
+    assert_eq!(editor.document().pose[..], editor.document().cage.mesh.positions[..]);
+}
+
 #[test]
 fn saved_poses_restore_their_factors_and_a_blend_shows_factors_of_1() {
     let mut editor = opened(&GLB);

@@ -10,15 +10,15 @@ use clap::builder::PossibleValuesParser;
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 
-use super::{CageSource, ModelOutput, ReadArgs, RigArgs, SolveArgs, mesh_help, number, obj_output};
+use super::{CageSource, ModelOutput, ReadArgs, RigArgs, SolveArgs, number, obj_output};
 
 /// Arguments of `cagework proportions`.
 #[derive(Args, Debug)]
 // The result always stands on the ground of the model.
 #[command(mut_arg("ground", |arg| arg.hide(true)))]
 #[command(mut_arg("shape_only", |arg| arg.help("Write the mesh only, without skin and clips")))]
-#[command(
-    after_help = "The bones are those that a VRM names, or those whose joints have usual names, or else the legs, arms \
+#[command(after_help = "Factors are numbers from 0.5 to 2; 1 changes nothing.\n\n\
+    The bones are those that a VRM names, or those whose joints have usual names, or else the legs, arms \
     and head that the shape of the skeleton shows. The summary lists them; --bone changes one.\n\n\
     The lowest point of the model, and of each clip, keeps its height. Clothes of the same body follow with `cagework \
     refit`, if --cage gives a cage around body and clothes and --pose-out writes its pose.\n\n\
@@ -27,12 +27,11 @@ use super::{CageSource, ModelOutput, ReadArgs, RigArgs, SolveArgs, mesh_help, nu
     cagework proportions avatar.vrm --preset chibi --left arm=0.8 -o chibi.vrm\n  \
     cagework proportions body.glb --leg 1.2 --save-cage cage.obj --pose-out tall.obj\n  \
     cagework proportions golem.glb --bone leftHand=Grip_L --arm 1.2 -o golem2.glb\n  \
-    cagework proportions --presets"
-)]
+    cagework proportions --presets")]
 #[command(group = clap::ArgGroup::new("result").required(true).multiple(true).args(["output", "pose_out", "ranges", "presets"]))]
 pub(crate) struct ProportionsArgs {
     /// Rigged humanoid.
-    #[arg(help = mesh_help("Rigged humanoid"), required_unless_present = "presets")]
+    #[arg(help = "Rigged humanoid (.glb, .vrm, .gltf)", required_unless_present = "presets")]
     pub(crate) mesh: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -94,9 +93,11 @@ impl Args for FactorArgs {
         let factor = |&(word, proportion): &(&'static str, Proportion)| {
             let facts = proportion.facts();
             let [low, high] = facts.natural;
-            Arg::new(Self::id(word)).long(word).value_name("FACTOR").value_parser(number::<f64>(FACTOR)).help(
-                format!("{}: {}; {low} to {high} looks natural on most figures", facts.help, FACTOR.allowed),
-            )
+            Arg::new(Self::id(word))
+                .long(word)
+                .value_name("FACTOR")
+                .value_parser(number::<f64>(FACTOR))
+                .help(format!("{}; natural from {low} to {high}", facts.help))
         };
         let side = |side: &'static str| {
             let sided = Proportion::ALL.iter().filter(|(_, proportion)| proportion.facts().is_sided);

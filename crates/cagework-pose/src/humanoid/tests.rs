@@ -23,9 +23,10 @@ const FIGURE: [(Bone, usize, [f32; 3]); 13] = [
 /// Number of bones in the middle, which precede those of a side.
 const MIDDLE: usize = 5;
 
-/// A rig with joints at the places of [`FIGURE`]. `names`: one per row, with `{}` for the side; joints without a name are
-/// left out. `sides`: words for left and right.
-pub(crate) fn rig_of(names: &[&str; 13], sides: [&str; 2]) -> Rig {
+/// A rig with joints at the places of [`FIGURE`]. `names`: one per row, separated by a comma and a blank, with `{}`
+/// for the side; joints without a name are left out. `sides`: words for left and right.
+pub(crate) fn rig_of(names: &str, sides: [&str; 2]) -> Rig {
+    let names: Vec<&str> = names.split(", ").collect();
     let mut joints: Vec<Joint> = Vec::new();
     for (side, word) in sides.into_iter().enumerate() {
         let mut number: Vec<Option<u32>> = Vec::new();
@@ -45,9 +46,10 @@ pub(crate) fn rig_of(names: &[&str; 13], sides: [&str; 2]) -> Rig {
     Rig { joints, first: vec![0], influences: Vec::new() }
 }
 
-/// Name of the joint of each bone of [`FIGURE`], on the left and on the right.
-fn check(label: &str, names: &[&str; 13], sides: [&str; 2], source: BoneSource) {
+/// Checks the joint of each bone of [`FIGURE`], on the left and on the right.
+fn check(label: &str, names: &str, sides: [&str; 2], source: BoneSource) {
     let rig = rig_of(names, sides);
+    let names: Vec<&str> = names.split(", ").collect();
     let humanoid = Humanoid::of_rig(&rig, &[]).unwrap_or_else(|error| panic!("{label}: {error}"));
     assert_eq!(humanoid.source(), source, "{label}");
     let joint = |bone: Bone| humanoid.joint(bone).map(|joint| rig.joints[joint as usize].name.clone());
@@ -67,318 +69,122 @@ fn check(label: &str, names: &[&str; 13], sides: [&str; 2], source: BoneSource) 
     }
 }
 
-/// Names as the exporters write them.
-#[test]
-fn bones_have_the_names_of_sixteen_makers() {
-    let by_names = |label: &str, sides: [&str; 2], names: [&str; 13]| {
-        check(label, &names, sides, BoneSource::Names);
-    };
-    by_names(
+/// Maker, words for left and right, and the names of [`FIGURE`] as its exporters write them.
+const MAKERS: [(&str, [&str; 2], &str); 15] = [
+    (
         "Mixamo",
         ["Left", "Right"],
-        [
-            "mixamorig:Hips",
-            "mixamorig:Spine",
-            "mixamorig:Spine1",
-            "mixamorig:Neck",
-            "mixamorig:Head",
-            "mixamorig:{}Shoulder",
-            "mixamorig:{}Arm",
-            "mixamorig:{}ForeArm",
-            "mixamorig:{}Hand",
-            "mixamorig:{}UpLeg",
-            "mixamorig:{}Leg",
-            "mixamorig:{}Foot",
-            "mixamorig:{}ToeBase",
-        ],
-    );
-    by_names(
+        "mixamorig:Hips, mixamorig:Spine, mixamorig:Spine1, mixamorig:Neck, mixamorig:Head, \
+         mixamorig:{}Shoulder, mixamorig:{}Arm, mixamorig:{}ForeArm, mixamorig:{}Hand, \
+         mixamorig:{}UpLeg, mixamorig:{}Leg, mixamorig:{}Foot, mixamorig:{}ToeBase",
+    ),
+    (
         "VRoid",
         ["L", "R"],
-        [
-            "J_Bip_C_Hips",
-            "J_Bip_C_Spine",
-            "J_Bip_C_Chest",
-            "J_Bip_C_Neck",
-            "J_Bip_C_Head",
-            "J_Bip_{}_Shoulder",
-            "J_Bip_{}_UpperArm",
-            "J_Bip_{}_LowerArm",
-            "J_Bip_{}_Hand",
-            "J_Bip_{}_UpperLeg",
-            "J_Bip_{}_LowerLeg",
-            "J_Bip_{}_Foot",
-            "J_Bip_{}_ToeBase",
-        ],
-    );
-    by_names(
+        "J_Bip_C_Hips, J_Bip_C_Spine, J_Bip_C_Chest, J_Bip_C_Neck, J_Bip_C_Head, \
+         J_Bip_{}_Shoulder, J_Bip_{}_UpperArm, J_Bip_{}_LowerArm, J_Bip_{}_Hand, \
+         J_Bip_{}_UpperLeg, J_Bip_{}_LowerLeg, J_Bip_{}_Foot, J_Bip_{}_ToeBase",
+    ),
+    (
         "Unreal",
         ["l", "r"],
-        [
-            "pelvis",
-            "spine_01",
-            "spine_02",
-            "neck_01",
-            "head",
-            "clavicle_{}",
-            "upperarm_{}",
-            "lowerarm_{}",
-            "hand_{}",
-            "thigh_{}",
-            "calf_{}",
-            "foot_{}",
-            "ball_{}",
-        ],
-    );
-    by_names(
+        "pelvis, spine_01, spine_02, neck_01, head, clavicle_{}, upperarm_{}, lowerarm_{}, \
+         hand_{}, thigh_{}, calf_{}, foot_{}, ball_{}",
+    ),
+    (
         "Blender's metarig",
         ["L", "R"],
-        [
-            "pelvis",
-            "spine",
-            "chest",
-            "neck",
-            "head",
-            "shoulder.{}",
-            "upper_arm.{}",
-            "forearm.{}",
-            "hand.{}",
-            "thigh.{}",
-            "shin.{}",
-            "foot.{}",
-            "toe.{}",
-        ],
-    );
-    by_names(
+        "pelvis, spine, chest, neck, head, shoulder.{}, upper_arm.{}, forearm.{}, hand.{}, \
+         thigh.{}, shin.{}, foot.{}, toe.{}",
+    ),
+    (
         "Unity",
         ["Left", "Right"],
-        [
-            "Hips",
-            "Spine",
-            "Chest",
-            "Neck",
-            "Head",
-            "{}Shoulder",
-            "{}UpperArm",
-            "{}LowerArm",
-            "{}Hand",
-            "{}UpperLeg",
-            "{}LowerLeg",
-            "{}Foot",
-            "{}Toes",
-        ],
-    );
-    by_names(
+        "Hips, Spine, Chest, Neck, Head, {}Shoulder, {}UpperArm, {}LowerArm, {}Hand, {}UpperLeg, \
+         {}LowerLeg, {}Foot, {}Toes",
+    ),
+    (
         "VRChat (Cats)",
         ["Left", "Right"],
-        [
-            "Hips",
-            "Spine",
-            "Chest",
-            "Neck",
-            "Head",
-            "{} shoulder",
-            "{} arm",
-            "{} elbow",
-            "{} wrist",
-            "{} leg",
-            "{} knee",
-            "{} ankle",
-            "{} toe",
-        ],
-    );
-    by_names(
+        "Hips, Spine, Chest, Neck, Head, {} shoulder, {} arm, {} elbow, {} wrist, {} leg, \
+         {} knee, {} ankle, {} toe",
+    ),
+    (
         "MMD",
         ["左", "右"],
-        [
-            "下半身",
-            "上半身",
-            "上半身2",
-            "首",
-            "頭",
-            "{}肩",
-            "{}腕",
-            "{}ひじ",
-            "{}手首",
-            "{}足",
-            "{}ひざ",
-            "{}足首",
-            "{}つま先",
-        ],
-    );
-    by_names(
+        "下半身, 上半身, 上半身2, 首, 頭, {}肩, {}腕, {}ひじ, {}手首, {}足, {}ひざ, {}足首, {}つま先",
+    ),
+    (
         "3ds Max",
         ["L", "R"],
-        [
-            "Bip01_Pelvis",
-            "Bip01_Spine",
-            "Bip01_Spine1",
-            "Bip01_Neck",
-            "Bip01_Head",
-            "Bip01_{}_Clavicle",
-            "Bip01_{}_UpperArm",
-            "Bip01_{}_Forearm",
-            "Bip01_{}_Hand",
-            "Bip01_{}_Thigh",
-            "Bip01_{}_Calf",
-            "Bip01_{}_Foot",
-            "Bip01_{}_Toe0",
-        ],
-    );
-    by_names(
+        "Bip01_Pelvis, Bip01_Spine, Bip01_Spine1, Bip01_Neck, Bip01_Head, Bip01_{}_Clavicle, \
+         Bip01_{}_UpperArm, Bip01_{}_Forearm, Bip01_{}_Hand, Bip01_{}_Thigh, Bip01_{}_Calf, \
+         Bip01_{}_Foot, Bip01_{}_Toe0",
+    ),
+    (
         "Valve",
         ["L", "R"],
-        [
-            "ValveBiped.Bip01_Pelvis",
-            "ValveBiped.Bip01_Spine",
-            "ValveBiped.Bip01_Spine1",
-            "ValveBiped.Bip01_Neck1",
-            "ValveBiped.Bip01_Head1",
-            "ValveBiped.Bip01_{}_Clavicle",
-            "ValveBiped.Bip01_{}_UpperArm",
-            "ValveBiped.Bip01_{}_Forearm",
-            "ValveBiped.Bip01_{}_Hand",
-            "ValveBiped.Bip01_{}_Thigh",
-            "ValveBiped.Bip01_{}_Calf",
-            "ValveBiped.Bip01_{}_Foot",
-            "ValveBiped.Bip01_{}_Toe0",
-        ],
-    );
-    by_names(
+        "ValveBiped.Bip01_Pelvis, ValveBiped.Bip01_Spine, ValveBiped.Bip01_Spine1, \
+         ValveBiped.Bip01_Neck1, ValveBiped.Bip01_Head1, ValveBiped.Bip01_{}_Clavicle, \
+         ValveBiped.Bip01_{}_UpperArm, ValveBiped.Bip01_{}_Forearm, ValveBiped.Bip01_{}_Hand, \
+         ValveBiped.Bip01_{}_Thigh, ValveBiped.Bip01_{}_Calf, ValveBiped.Bip01_{}_Foot, \
+         ValveBiped.Bip01_{}_Toe0",
+    ),
+    (
         "Character Creator",
         ["L", "R"],
-        [
-            "CC_Base_Hip",
-            "",
-            "",
-            "",
-            "CC_Base_Head",
-            "CC_Base_{}_Clavicle",
-            "CC_Base_{}_Upperarm",
-            "CC_Base_{}_Forearm",
-            "CC_Base_{}_Hand",
-            "CC_Base_{}_Thigh",
-            "CC_Base_{}_Calf",
-            "CC_Base_{}_Foot",
-            "CC_Base_{}_ToeBase",
-        ],
-    );
-    by_names(
+        "CC_Base_Hip, , , , CC_Base_Head, CC_Base_{}_Clavicle, CC_Base_{}_Upperarm, \
+         CC_Base_{}_Forearm, CC_Base_{}_Hand, CC_Base_{}_Thigh, CC_Base_{}_Calf, \
+         CC_Base_{}_Foot, CC_Base_{}_ToeBase",
+    ),
+    (
         "Daz",
         ["l", "r"],
-        [
-            "pelvis",
-            "",
-            "",
-            "",
-            "head",
-            "{}Collar",
-            "{}ShldrBend",
-            "{}ForearmBend",
-            "{}Hand",
-            "{}ThighBend",
-            "{}Shin",
-            "{}Foot",
-            "{}Toe",
-        ],
-    );
-    by_names(
+        "pelvis, , , , head, {}Collar, {}ShldrBend, {}ForearmBend, {}Hand, {}ThighBend, {}Shin, \
+         {}Foot, {}Toe",
+    ),
+    (
         "ARKit",
         ["left", "right"],
-        [
-            "hips_joint",
-            "",
-            "",
-            "neck_1_joint",
-            "head_joint",
-            "{}_shoulder_1_joint",
-            "{}_arm_joint",
-            "{}_forearm_joint",
-            "{}_hand_joint",
-            "{}_upLeg_joint",
-            "{}_leg_joint",
-            "{}_foot_joint",
-            "{}_toes_joint",
-        ],
-    );
-    by_names(
+        "hips_joint, , , neck_1_joint, head_joint, {}_shoulder_1_joint, {}_arm_joint, \
+         {}_forearm_joint, {}_hand_joint, {}_upLeg_joint, {}_leg_joint, {}_foot_joint, \
+         {}_toes_joint",
+    ),
+    (
         "Quaternius",
         ["L", "R"],
-        [
-            "Hips",
-            "Abdomen",
-            "Torso",
-            "Neck",
-            "Head",
-            "Shoulder.{}",
-            "UpperArm.{}",
-            "LowerArm.{}",
-            "Palm.{}",
-            "UpperLeg.{}",
-            "LowerLeg.{}",
-            "Foot.{}",
-            "",
-        ],
-    );
-    by_names(
+        "Hips, Abdomen, Torso, Neck, Head, Shoulder.{}, UpperArm.{}, LowerArm.{}, Palm.{}, \
+         UpperLeg.{}, LowerLeg.{}, Foot.{}, ",
+    ),
+    (
         "KayKit",
         ["l", "r"],
-        [
-            "hips",
-            "spine",
-            "chest",
-            "",
-            "head",
-            "",
-            "upperarm.{}",
-            "lowerarm.{}",
-            "hand.{}",
-            "upperleg.{}",
-            "lowerleg.{}",
-            "foot.{}",
-            "toes.{}",
-        ],
-    );
-    by_names(
+        "hips, spine, chest, , head, , upperarm.{}, lowerarm.{}, hand.{}, upperleg.{}, \
+         lowerleg.{}, foot.{}, toes.{}",
+    ),
+    (
         "an armature of Maya",
         ["l", "r"],
-        [
-            "c_pelvis_jnt",
-            "c_spine_jnt",
-            "c_chest_jnt",
-            "c_neck_jnt",
-            "c_head_jnt",
-            "{}_clavicle_jnt",
-            "{}_upperArm_jnt",
-            "{}_lowerArm_jnt",
-            "{}_hand_jnt",
-            "{}_thigh_jnt",
-            "{}_shin_jnt",
-            "{}_ankle_jnt",
-            "{}_ball_jnt",
-        ],
-    );
+        "c_pelvis_jnt, c_spine_jnt, c_chest_jnt, c_neck_jnt, c_head_jnt, {}_clavicle_jnt, \
+         {}_upperArm_jnt, {}_lowerArm_jnt, {}_hand_jnt, {}_thigh_jnt, {}_shin_jnt, {}_ankle_jnt, \
+         {}_ball_jnt",
+    ),
+];
+
+#[test]
+fn bones_have_the_names_of_sixteen_makers() {
+    for (label, sides, names) in MAKERS {
+        check(label, names, sides, BoneSource::Names);
+    }
 }
 
 /// Rigify calls hips, neck and head "spine".
 #[test]
 fn a_rigify_spine_begins_with_the_hips_and_ends_with_the_head() {
-    let names = [
-        "DEF-spine",
-        "DEF-spine.001",
-        "DEF-spine.002",
-        "DEF-spine.005",
-        "DEF-spine.006",
-        "DEF-shoulder.{}",
-        "DEF-upper_arm.{}",
-        "DEF-forearm.{}",
-        "DEF-hand.{}",
-        "DEF-thigh.{}",
-        "DEF-shin.{}",
-        "DEF-foot.{}",
-        "DEF-toe.{}",
-    ];
-    let rig = rig_of(&names, ["L", "R"]);
+    let names = "DEF-spine, DEF-spine.001, DEF-spine.002, DEF-spine.005, DEF-spine.006, DEF-shoulder.{}, \
+         DEF-upper_arm.{}, DEF-forearm.{}, DEF-hand.{}, DEF-thigh.{}, DEF-shin.{}, DEF-foot.{}, \
+         DEF-toe.{}";
+    let rig = rig_of(names, ["L", "R"]);
     let humanoid = Humanoid::of_rig(&rig, &[]).unwrap();
     let name = |bone| humanoid.joint(bone).map(|joint| rig.joints[joint as usize].name.as_str());
     let found = [Bone::Hips, Bone::Neck, Bone::Head].map(name);
@@ -388,75 +194,23 @@ fn a_rigify_spine_begins_with_the_hips_and_ends_with_the_head() {
 /// Names in German, Spanish and Korean.
 #[test]
 fn bones_without_known_names_are_found_by_the_shape() {
-    let german = [
-        "Huefte",
-        "Wirbel",
-        "Brust",
-        "Hals",
-        "Kopf",
-        "Schulter {}",
-        "Oberarm {}",
-        "Unterarm {}",
-        "Hand {}x",
-        "Oberschenkel {}",
-        "Unterschenkel {}",
-        "Fuss {}",
-        "Zehen {}",
-    ];
-    let spanish = [
-        "cadera",
-        "columna",
-        "pecho",
-        "cuello",
-        "cabeza",
-        "clavicula_{}",
-        "brazo_{}",
-        "antebrazo_{}",
-        "mano_{}",
-        "muslo_{}",
-        "pantorrilla_{}",
-        "pie_{}",
-        "dedos_{}",
-    ];
-    let korean = [
-        "골반",
-        "척추",
-        "가슴",
-        "목",
-        "머리",
-        "어깨{}",
-        "위팔{}",
-        "아래팔{}",
-        "손{}",
-        "허벅지{}",
-        "종아리{}",
-        "발{}",
-        "발가락{}",
-    ];
-    check("German", &german, ["links", "rechts"], BoneSource::Shape);
-    check("Spanish", &spanish, ["izq", "der"], BoneSource::Shape);
-    check("Korean", &korean, ["_1", "_2"], BoneSource::Shape);
+    let german = "Huefte, Wirbel, Brust, Hals, Kopf, Schulter {}, Oberarm {}, Unterarm {}, Hand {}x, \
+         Oberschenkel {}, Unterschenkel {}, Fuss {}, Zehen {}";
+    let spanish = "cadera, columna, pecho, cuello, cabeza, clavicula_{}, brazo_{}, antebrazo_{}, mano_{}, \
+         muslo_{}, pantorrilla_{}, pie_{}, dedos_{}";
+    let korean =
+        "골반, 척추, 가슴, 목, 머리, 어깨{}, 위팔{}, 아래팔{}, 손{}, 허벅지{}, 종아리{}, 발{}, 발가락{}";
+    check("German", german, ["links", "rechts"], BoneSource::Shape);
+    check("Spanish", spanish, ["izq", "der"], BoneSource::Shape);
+    check("Korean", korean, ["_1", "_2"], BoneSource::Shape);
 }
 
-const UNITY: [&str; 13] = [
-    "Hips",
-    "Spine",
-    "Chest",
-    "Neck",
-    "Head",
-    "{}Shoulder",
-    "{}UpperArm",
-    "{}LowerArm",
-    "{}Hand",
-    "{}UpperLeg",
-    "{}LowerLeg",
-    "{}Foot",
-    "{}Toes",
-];
+const UNITY: &str = "Hips, Spine, Chest, Neck, Head, {}Shoulder, {}UpperArm, {}LowerArm, {}Hand, {}UpperLeg, \
+    {}LowerLeg, {}Foot, {}Toes";
 
 /// A rig of a figure with the names of Unity.
 pub(crate) fn unity_rig() -> Rig {
-    rig_of(&UNITY, ["Left", "Right"])
+    rig_of(UNITY, ["Left", "Right"])
 }
 
 #[test]

@@ -39,7 +39,7 @@ cagework_core::choice! {
         Leg = "leg",
         /// Length of the arms, without the hands.
         Arm = "arm",
-        /// Height of the trunk from the hips to the shoulders.
+        /// Height of the trunk from the hips to the neck.
         Torso = "torso",
         /// Length of the neck.
         Neck = "neck",
@@ -89,7 +89,7 @@ impl Proportion {
             Self::Limb => ("Thickness of arms and legs", LIMBS, true, [0.75, 1.4]),
             Self::Hand => ("Size of the hands", LIMBS, true, [0.7, 1.4]),
             Self::Foot => ("Size of the feet", LIMBS, true, [0.7, 1.4]),
-            Self::Torso => ("Height of the trunk from hips to shoulders", TRUNK, false, [0.75, 1.3]),
+            Self::Torso => ("Height of the trunk from the hips to the neck", TRUNK, false, [0.75, 1.3]),
             Self::Shoulder => ("Distance between the shoulders", TRUNK, false, [0.8, 1.3]),
             Self::Waist => ("Width of the waist", TRUNK, false, [0.75, 1.4]),
             Self::Hip => ("Width of the hips", TRUNK, false, [0.85, 1.2]),
