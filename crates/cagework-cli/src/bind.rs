@@ -1,13 +1,17 @@
 //! `cagework bind`: computes the weights of a mesh in a cage, a report, and the reconstructed rest pose.
 
+use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
-use cagework_core::bind::{BindError, Binding, weights_bytes};
+use cagework_core::bind::{Binding, weights_bytes};
 use cagework_core::deform::deform_bound;
+use cagework_core::field::Field;
 use cagework_core::options::BindOptions;
 use cagework_core::{Cage, Controls, bind};
 use cagework_gpu::bind_on;
 use cagework_io::{Model, ModelFormat, ReshapeOptions, write_weights_npz};
+use cagework_job::{BoundPoints, Follow, Job, JobError, Poses, require_memory};
+use cagework_pose::parts::Parts;
 use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
@@ -17,7 +21,6 @@ use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
 use crate::load::{load_cage, load_model};
 use crate::progress::Bar;
-use crate::rig;
 
 /// Runs `cagework bind`.
 ///
@@ -42,14 +45,16 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let loaded = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
     let (cage, controls) = (&loaded.cage, loaded.controls());
     refuse_files_read(&outputs)?;
-    let (points, extra_points) =
-        if args.shape_only { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
+    let of_mesh = |e| CliError::job(&args.mesh, e);
+    // Weights contain the points of the rig whatever the format of the output, because `deform` may write a GLB.
+    let job = Job::of_resolved(&model, ModelFormat::Gltf, ReshapeOptions::default(), args.shape_only);
+    let (points, extra_points) = job.all_points().map_err(of_mesh)?;
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
     let weights = weights_bytes(points.len(), controls.n_controls());
     let npz = if args.weights.is_some() { weights } else { 0 };
     let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
-    let to_write = check_memory(&options, points.len(), controls, npz.max(output))?;
+    let to_write = require_memory(&options, points.len(), controls, npz.max(output))?;
     let mut binding = bind_positions(&points, controls, args.solve.on_gpu(), &options)?;
     let memory = &mut binding.report.memory_bytes;
     memory.estimated = memory.estimated.max(to_write);
@@ -63,20 +68,12 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         )?;
     }
     if let Some(output) = &args.output {
-        let rest = deform(&binding, controls.rest());
-        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() && !args.shape_only {
-            let by: Vec<DVec3> = rest.iter().zip(&points).map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect();
-            let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
-            let written = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default());
-            let (bytes, report) = written.map_err(|e| CliError::file(&output.path, e))?;
-            binding.report.notices.extend(report.notices());
-            bytes
-        } else {
-            export(&model, &rest[..model.positions.len()], output)?
-        };
-        write(&output.path, &bytes)?;
-        binding.report.notices.extend(model.lost_in(output.format));
-        binding.report.notices.extend(model.copies_in(output.format, &bytes));
+        let restored = Restored { points: &points, binding: &binding, rest: controls.rest() };
+        let job = Job::of_resolved(&model, output.format, ReshapeOptions::default(), args.shape_only);
+        let deformed = job.deform(&restored, &Poses::Shape(Vec::new())).map_err(of_mesh)?;
+        let written = job.write(deformed).map_err(|e| CliError::job(&output.path, e))?;
+        write(&output.path, &written.bytes)?;
+        binding.report.notices.extend(written.notices);
     }
     save_cage(args.save_cage.as_deref(), cage, &model)?;
     let report = json(&binding.report);
@@ -88,6 +85,55 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     let written: Vec<PathBuf> = outputs.iter().map(|path| path.to_path_buf()).collect();
     print(&card::of(&binding.report, &model.notices, &written))
+}
+
+/// The rest pose as the weights restore it.
+struct Restored<'a> {
+    /// Bound points at rest. `[n_points]`, object units
+    points: &'a [Vec3],
+    binding: &'a Binding,
+    /// Positions of the controls at rest. `[n_controls]`, object units
+    rest: &'a [Vec3],
+}
+
+impl Follow for Restored<'_> {
+    type Error = JobError;
+
+    fn displacements(&self, _: &Model, _: &[Vec3]) -> Result<Vec<DVec3>, JobError> {
+        let restored = deform(self.binding, self.rest);
+        Ok(restored.iter().zip(self.points).map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect())
+    }
+
+    fn vertices(&self, model: &Model, _: &[Vec3], _: &Parts) -> Result<Vec<Vec3>, JobError> {
+        let mut restored = deform(self.binding, self.rest);
+        restored.truncate(model.positions.len());
+        Ok(restored)
+    }
+
+    fn field(&self, _: &[Vec3]) -> Result<Option<Field>, JobError> {
+        Ok(None)
+    }
+
+    fn outside(&self) -> Vec<u32> {
+        self.binding.outside.iter().map(|o| o.vertex).collect()
+    }
+}
+
+/// Binds what a job needs, with a progress bar. `mesh`: file of the model.
+///
+/// # Errors
+/// If the bind fails or is cancelled, or the memory limit is exceeded.
+pub(crate) fn bind_job<M: Borrow<Model>>(
+    job: &Job<M>,
+    controls: Controls<'_>,
+    poses: &Poses,
+    options: &BindOptions,
+    mesh: &Path,
+) -> Result<BoundPoints, CliError> {
+    let points = job.points(controls, poses, options).map_err(|e| CliError::job(mesh, e))?;
+    let Some(points) = points else { return Ok(BoundPoints::nothing(controls.rest().to_vec())) };
+    let binding = bind_positions(&points.positions, controls, false, &points.options)?;
+    Ok(points.bound(binding, controls))
 }
 
 /// Binds all vertices of a model, with a progress bar.
@@ -108,22 +154,6 @@ pub(crate) fn save_cage(path: Option<&Path>, cage: &Cage, model: &Model) -> Resu
     let mesh = model.up().mesh_turned_back(&cage.to_polygon_mesh());
     let made = Model::of_mesh("cage.obj", &mesh, model.origin())?;
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
-}
-
-/// Returns the memory in use while an output is encoded, bytes: `options.held`, the weights of `points` points, and
-/// `to_write`, the memory for encoding.
-///
-/// # Errors
-/// If the needed memory exceeds the limit.
-pub(crate) fn check_memory(
-    options: &BindOptions,
-    points: usize,
-    controls: Controls<'_>,
-    to_write: u64,
-) -> Result<u64, BindError> {
-    let (limit, columns) = (options.memory_limit, controls.n_controls());
-    let needed = options.held + weights_bytes(points, columns) + to_write;
-    if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
 }
 
 /// Binds positions on the GPU or the processor, with a progress bar.

@@ -11,6 +11,7 @@ use cagework_core::cage::CageError;
 use cagework_core::{ClosedFormError, ControlError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, ObjError, ReadError, shown};
+use cagework_job::JobError;
 use thiserror::Error;
 
 /// Displays a path with control characters escaped.
@@ -76,6 +77,14 @@ impl CliError {
     /// Creates an error about one file.
     pub(crate) fn file(path: &Path, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { path: path.to_path_buf(), source: source.into() }
+    }
+
+    /// Creates an error about the job of one file. Errors of binds do not name the file.
+    pub(crate) fn job(path: &Path, error: JobError) -> Self {
+        match error {
+            JobError::Bind(error) => error.into(),
+            error => Self::file(path, error),
+        }
     }
 
     /// Returns the error's message, followed by its chain of causes, each cause once.

@@ -11,7 +11,7 @@ use cagework_core::words::counted;
 use cagework_core::{
     Bounds, Cage, CageError, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh, subdivided_box,
 };
-use cagework_io::{Model, PoseState, UpAxis};
+use cagework_io::{Model, PoseState, SavedWeights, UpAxis, read_weights_npz};
 use glam::{DVec3, Vec3};
 
 use crate::args::{CageSource, ControlArgs, MemoryArgs, ModelOutput};
@@ -203,6 +203,35 @@ pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Resul
         hint: "move the model closer to the origin, scale it, or give a smaller --margin",
     })?;
     Ok(mesh)
+}
+
+/// Reads weights, and checks that they match the mesh and the cage.
+///
+/// # Errors
+/// If the file cannot be read, or its numbers of vertices differ from those of mesh and cage.
+pub(crate) fn load_weights(
+    path: &Path,
+    model: &Model,
+    cage: &Cage,
+    memory: MemoryArgs,
+) -> Result<SavedWeights, CliError> {
+    let saved = read_weights_npz(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
+    let (n_vertices, n_cage) = (model.positions.len(), cage.n_vertices());
+    let n_bound =
+        (saved.weights.n_columns() - saved.frames.n_columns()).saturating_sub(saved.inner_controls.len());
+    if (saved.n_vertices(), n_bound) == (n_vertices, n_cage) {
+        return Ok(saved);
+    }
+    Err(CliError::Mismatch {
+        message: format!(
+            "{}: has weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
+             the cage {n_cage}",
+            shown_path(path),
+            saved.n_vertices(),
+            n_bound,
+        ),
+        hint: "use the mesh and the cage that were bound, or bind these again",
+    })
 }
 
 impl LoadedCage {

@@ -6,13 +6,11 @@
 mod args;
 mod bind;
 mod cage;
-mod capture;
 mod card;
 mod check;
 mod controls;
 mod deform;
 mod demo;
-mod dynamic;
 mod error;
 mod field;
 mod files;
@@ -26,7 +24,6 @@ mod proportions;
 mod pull;
 mod refit;
 mod render;
-mod rig;
 mod signals;
 mod transfer;
 

@@ -13,10 +13,9 @@ use cagework_pose::pull::{Grip, Handle, Probes, Pull, PullError};
 use glam::Vec3;
 
 use crate::args::{CageSource, PoseArgs};
-use crate::deform::load_weights;
 use crate::error::CliError;
 use crate::files::{check_outputs, shown_path, write};
-use crate::load::{LoadedCage, load_any, load_cage};
+use crate::load::{LoadedCage, load_any, load_cage, load_weights};
 
 /// A model with its cage and weights.
 pub(crate) struct BoundModel {

@@ -3,23 +3,20 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use cagework_core::Binding;
 use cagework_core::deform::outside_in_words;
-use cagework_core::options::BindOptions;
 use cagework_core::words::counted;
-use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
+use cagework_io::{ReshapeReport, shown};
+use cagework_job::{Job, Poses};
 use cagework_pose::humanoid::{BoneJoint, BoneSource};
 use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, ProportionRange};
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, ModelOutput, ProportionsArgs};
-use crate::bind::{bind_positions, check_memory, save_cage};
-use crate::deform::{Deformation, Poses, pose_name};
+use crate::args::{CageSource, ControlArgs, ProportionsArgs};
+use crate::bind::{bind_positions, save_cage};
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::load::{LoadedCage, load_cage, load_model};
-use crate::rig;
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
@@ -67,7 +64,18 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
         loaded.require_order_in(output)?;
     }
     refuse_files_read(&outputs)?;
-    let (bound, extra_points) = bind_model(args, (mesh, &model), &loaded)?;
+    let mut options = args.rig.job_options(false);
+    options.reshape.ground = true;
+    // Without an output, only the vertices are bound.
+    options.shape_only |= args.output.is_none();
+    let format = args.output.as_ref().map_or_else(|| model.format(), |output| output.format);
+    let of_mesh = |e| CliError::job(mesh, e);
+    let job = Job::new(&model, format, &options).map_err(of_mesh)?;
+    let at_rest = Poses::Shape(loaded.cage.positions().to_vec());
+    let bind_options = args.solve.options(args.grid, args.read.memory);
+    let points = job.points(loaded.controls(), &at_rest, &bind_options).map_err(of_mesh)?;
+    let points = points.ok_or_else(|| CliError::file(mesh, "has no vertices"))?;
+    let bound = bind_positions(&points.positions, loaded.controls(), args.solve.on_gpu(), &points.options)?;
     let rest = loaded.cage.positions();
     let cage = HumanoidCage::new(rest, loaded.rings(), &model.positions, &rig, &humanoid);
     let cage = cage.with_bind(&bound.weights, &model.positions, &rig, &humanoid);
@@ -92,36 +100,13 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
     if let Some(output) = &args.output {
         let of_model = bound.outside.iter().filter(|o| (o.vertex as usize) < model.positions.len());
         summary.notices.extend(outside_in_words(of_model, loaded.cage.diagonal()));
-        let Binding { weights, frames, outside, .. } = bound;
-        let saved = SavedWeights { weights, frames, outside, extra_points, inner_controls: Vec::new() };
-        deform(
-            args,
-            (mesh, &model),
-            output,
-            saved,
-            &Poses { names: vec![name_of(args)], rest: rest.to_vec(), positions: vec![pose] },
-            &mut summary,
-        )?;
+        let deformed = job.deform(&points.bound(bound, loaded.controls()), &Poses::Shape(pose));
+        let written = job.write(deformed.map_err(of_mesh)?).map_err(|e| CliError::job(&output.path, e))?;
+        write(&output.path, &written.bytes)?;
+        summary.notices.extend(written.notices);
+        summary.rig = written.rig;
     }
     print(&if as_json { json(&summary) } else { text(&summary) })
-}
-
-/// Binds the model and, if it is written with its rig, the points of the rig. Also returns these points.
-fn bind_model(
-    args: &ProportionsArgs,
-    (mesh, model): (&Path, &Model),
-    loaded: &LoadedCage,
-) -> Result<(Binding, Vec<Vec3>), CliError> {
-    let has_rig =
-        args.output.as_ref().is_some_and(|output| output.format == ModelFormat::Gltf) && !args.rig.shape_only;
-    let (points, extra_points) =
-        if has_rig { rig::points(model, mesh)? } else { (model.positions.clone(), 0) };
-    let options =
-        BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
-    let to_write = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
-    check_memory(&options, points.len(), loaded.controls(), to_write)?;
-    let bound = bind_positions(&points, loaded.controls(), args.solve.on_gpu(), &options)?;
-    Ok((bound, points[model.positions.len()..].to_vec()))
 }
 
 /// Pose of the cage: the proportions, added to the pose of `--pose`.
@@ -131,33 +116,6 @@ fn pose_of(args: &ProportionsArgs, loaded: &LoadedCage, cage: &HumanoidCage) -> 
     let pulled = loaded.load_pose(path)?;
     let by = pose.iter().zip(loaded.cage.positions()).map(|(&own, &rest)| own - rest);
     Ok(pulled.iter().zip(by).map(|(&pulled, by)| pulled + by).collect())
-}
-
-/// Name of the pose: that of its file.
-fn name_of(args: &ProportionsArgs) -> String {
-    args.pose_out.as_ref().map_or_else(|| "proportions".into(), |output| pose_name(&output.path))
-}
-
-/// Writes the deformed model.
-fn deform(
-    args: &ProportionsArgs,
-    (mesh, model): (&Path, &Model),
-    output: &ModelOutput,
-    saved: SavedWeights,
-    poses: &Poses,
-    summary: &mut Summary,
-) -> Result<(), CliError> {
-    args.rig.check_clips(model, mesh, 1)?;
-    let (options, of_names) = args.rig.options(model, mesh)?;
-    let options = ReshapeOptions { ground: true, ..options };
-    let deformation = Deformation::new(model, saved, poses, output.format, (&options, args.rig.shape_only));
-    let (bytes, report) = deformation.into_file(model, &poses.names, output, &options)?;
-    summary.notices.extend(of_names);
-    summary.notices.extend(report.iter().flat_map(ReshapeReport::notices));
-    summary.notices.extend(model.lost_in(output.format));
-    summary.notices.extend(model.copies_in(output.format, &bytes));
-    summary.rig = report;
-    write(&output.path, &bytes)
 }
 
 fn preset_text(preset: &Preset) -> String {

@@ -20,11 +20,10 @@ use serde::Serialize;
 use crate::args::{CageSource, RenderArgs, ShowArg};
 use crate::bind::bind_positions;
 use crate::controls::with_inner;
-use crate::deform::load_weights;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
 use crate::gpu;
-use crate::load::{LoadedCage, load_any, load_cage};
+use crate::load::{LoadedCage, load_any, load_cage, load_weights};
 use crate::progress::Bar;
 
 /// Output of `--json`.

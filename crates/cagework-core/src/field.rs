@@ -94,6 +94,20 @@ impl Lattice {
         lattice
     }
 
+    /// Creates the lattice like [`Self::new`], and returns the options for binding [`Self::points`]: the memory of the
+    /// lattice and its field is held, and weights outside the cage are extended.
+    ///
+    /// # Errors
+    /// [`BindError::Memory`] if the lattice and its field exceed the memory limit.
+    pub fn within(cage: &Cage, cells: u32, options: &BindOptions) -> Result<(Self, BindOptions), BindError> {
+        let dims = Self::size(cage, cells).2.to_array();
+        let held = options.held + dims.into_iter().map(u64::from).product::<u64>() * NODE_BYTES;
+        if held > options.memory_limit {
+            return Err(BindError::Memory { needed: held, limit: options.memory_limit });
+        }
+        Ok((Self::new(cage, cells), BindOptions { outside: OutsidePolicy::Extend, held, ..*options }))
+    }
+
     /// Returns the edge of a cell, the number of cells of the margin on each side, and the number of nodes along each
     /// axis.
     fn size(cage: &Cage, cells: u32) -> (f32, f32, UVec3) {
@@ -245,7 +259,7 @@ impl FieldWeights {
     /// weights outside the cage are always extended.
     ///
     /// # Errors
-    /// As [`bind`]; [`BindError::Memory`] also if the lattice itself exceeds the memory limit.
+    /// As [`bind`] and [`Lattice::within`].
     pub fn bind<'a>(
         controls: impl Into<Controls<'a>>,
         cells: u32,
@@ -253,13 +267,7 @@ impl FieldWeights {
         progress: &dyn Progress,
     ) -> Result<Self, BindError> {
         let controls = controls.into();
-        let dims = Lattice::size(controls.surface(), cells).2.to_array();
-        let needed = options.held + dims.into_iter().map(u64::from).product::<u64>() * NODE_BYTES;
-        if needed > options.memory_limit {
-            return Err(BindError::Memory { needed, limit: options.memory_limit });
-        }
-        let lattice = Lattice::new(controls.surface(), cells);
-        let options = BindOptions { outside: OutsidePolicy::Extend, held: needed, ..*options };
+        let (lattice, options) = Lattice::within(controls.surface(), cells, options)?;
         let binding = bind(&lattice.points(), controls, &options, progress)?;
         Ok(Self::new(lattice, binding.weights, binding.frames))
     }

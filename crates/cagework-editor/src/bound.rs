@@ -7,7 +7,8 @@ use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::{Frames, Weights};
 use cagework_io::{Ground, Model, ReadError, WriteError};
-use cagework_pose::parts::BoundParts;
+use cagework_job::{Follow, JobError};
+use cagework_pose::parts::{BoundParts, Parts};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
@@ -50,6 +51,9 @@ pub enum BoundError {
     /// A file cannot be written, or a rig cannot be read.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// A model cannot be deformed in this way.
+    #[error(transparent)]
+    Job(#[from] JobError),
 }
 
 /// Weights of all models in a cage.
@@ -218,34 +222,60 @@ pub(crate) struct ModelRows<'a> {
     pub(crate) rig: Weights,
 }
 
-/// A model and its weights, from which its displacements in a pose of the cage are computed.
+/// One model of a document, and how it follows the cage. Before a bind, its points stay.
 pub(crate) struct MovedModel<'a> {
-    pub(crate) model: Arc<Model>,
-    rest: &'a [Vec3],
+    all: BoundDocument<'a>,
+    id: u32,
+    /// Rows of a model with a rig; `None` for other models, and before a bind.
     rows: Option<ModelRows<'a>>,
-    /// Indices of the points outside the cage.
-    pub(crate) outside: Vec<u32>,
+    /// Vertices of all models that are exported instead of those in a pose. `[n_vertices]`
+    shown: Option<Vec<Vec3>>,
 }
 
 impl<'a> MovedModel<'a> {
-    pub(crate) fn new(all: &BoundDocument<'a>, id: u32) -> Result<Self, BoundError> {
-        let model = Arc::clone(&all.document().models.get(id)?.model);
-        let rows = all.bound.map(|bound| all.rows(id, bound)).transpose()?;
-        let outside = rows.iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect();
-        Ok(Self { model, rest: all.rest(), rows, outside })
+    /// `shown`: vertices of all models that are exported instead of those in a pose, such as a frame of a clip.
+    pub(crate) fn new(all: BoundDocument<'a>, id: u32, shown: Option<Vec<Vec3>>) -> Result<Self, BoundError> {
+        let is_rigged = all.document().models.get(id)?.model.is_rigged();
+        let rows = all.bound.filter(|_| is_rigged).map(|bound| all.rows(id, bound)).transpose()?;
+        Ok(Self { all, id, rows, shown })
     }
+}
 
-    /// Computes the displacements of the model's vertices and of the points of its rig.
-    pub(crate) fn by(&self, pose: &[Vec3]) -> Result<Vec<DVec3>, BoundError> {
+impl Follow for MovedModel<'_> {
+    type Error = BoundError;
+
+    fn displacements(&self, model: &Model, pose: &[Vec3]) -> Result<Vec<DVec3>, BoundError> {
+        let rest = self.all.rest();
         match &self.rows {
-            Some(ModelRows { weights, frames, rig, .. }) if pose.len() == self.rest.len() => {
-                let mut by = displacements(weights, frames, self.rest, pose);
-                by.extend(displacements(rig, frames, self.rest, pose));
+            Some(ModelRows { weights, frames, rig, .. }) if pose.len() == rest.len() => {
+                let mut by = displacements(weights, frames, rest, pose);
+                by.extend(displacements(rig, frames, rest, pose));
                 Ok(by)
             }
             Some(_) => Err(BoundError::OtherCage),
-            None => Ok(vec![DVec3::ZERO; self.model.positions.len() + self.model.extra_points()?.len()]),
+            None => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
         }
+    }
+
+    fn vertices(&self, _: &Model, pose: &[Vec3], _: &Parts) -> Result<Vec<Vec3>, BoundError> {
+        let member = self.all.document().models.get(self.id)?;
+        match &self.shown {
+            Some(shown) => Ok(member.share(shown).to_vec()),
+            None => Ok(member.share(&self.all.deformed(pose)?).to_vec()),
+        }
+    }
+
+    fn field(&self, pose: &[Vec3]) -> Result<Option<Field>, BoundError> {
+        if pose == self.all.rest() {
+            return Ok(None);
+        }
+        let how = "wait until the space around the cage is bound";
+        let lattice = self.all.lattice.ok_or(BoundError::Missing { what: "lattice", how })?;
+        Ok(Some(lattice.pose(self.all.rest(), pose)))
+    }
+
+    fn outside(&self) -> Vec<u32> {
+        self.rows.iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect()
     }
 }
 

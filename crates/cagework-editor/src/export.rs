@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use cagework_core::field::bend_vertices;
 use cagework_core::{InnerControls, PolygonMesh};
 use cagework_io::{
-    Feet, Ground, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, shown, write_cage_obj,
-    write_inner_controls, write_weights_npz,
+    Feet, Ground, Model, ModelFormat, ReshapeOptions, Skeleton, shown, write_cage_obj, write_inner_controls,
+    write_weights_npz,
 };
-use glam::{DVec3, Vec3};
+use cagework_job::{BoundPoints, Job, NamedPose, Poses, Written};
+use glam::Vec3;
 
 use crate::bound::{BoundDocument, BoundError, MovedModel};
 use crate::document::Document;
@@ -24,6 +24,12 @@ pub struct Exported {
     pub notices: Vec<String>,
 }
 
+impl From<Written> for Exported {
+    fn from(Written { bytes, notices, .. }: Written) -> Self {
+        Self { bytes, notices }
+    }
+}
+
 impl BoundDocument<'_> {
     /// Exports the posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With
     /// `options.dynamic`, the frames of the model's clip with the index `clip` become morph targets instead.
@@ -31,13 +37,14 @@ impl BoundDocument<'_> {
     /// # Errors
     /// If the file cannot be written.
     pub fn glb(&self, id: u32, options: &RigOptions, clip: Option<usize>) -> Result<Exported, BoundError> {
-        if let Some(capture) = self.posed_capture(id, ModelFormat::Gltf)? {
-            return Ok(capture);
-        }
-        match clip {
-            Some(clip) if options.dynamic => self.baked(id, clip),
-            _ => self.posed_glb(id, options),
-        }
+        let pose = &self.document().pose;
+        let job = match clip {
+            Some(clip) if options.dynamic => {
+                self.job(id, ModelFormat::Gltf, ReshapeOptions::default(), true)?.of_clip(clip)
+            }
+            _ => self.job(id, ModelFormat::Gltf, self.of_rig(pose, options)?, options.plain)?,
+        };
+        self.posed(id, &job, None)
     }
 
     /// Fits a file of clips without a mesh to the posed skeleton of the model with the most joints. Matches joints by
@@ -62,14 +69,14 @@ impl BoundDocument<'_> {
         let bodies = models.iter().rev().filter(|member| member.model.is_rigged());
         let body = bodies.max_by_key(|member| member.model.counts.joints);
         let body = body.ok_or(BoundError::Missing { what: "skeleton", how: "open a model that has one" })?;
-        let moved = MovedModel::new(self, body.id)?;
         clips.set_up(models.up());
         clips.set_origin(models.origin());
-        let skeleton = moved.model.skeleton(&moved.by(pose)?, &moved.outside, &options)?;
-        let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
-        let by = vec![DVec3::ZERO; clips.extra_points()?.len()];
-        let (bytes, report) = clips.write_reshaped(&by, &[], &[], &options)?;
-        Ok(Exported { bytes, notices: report.notices() })
+        let job = self.job(body.id, ModelFormat::Gltf, options.clone(), false)?;
+        let skeleton = Some(Arc::new(job.skeleton(&MovedModel::new(*self, body.id, None)?, pose)?));
+        let options = ReshapeOptions { skeleton, ..options };
+        let job = Job::of_resolved(&clips, ModelFormat::Gltf, options, false);
+        let nothing = BoundPoints::nothing(pose.to_vec());
+        Ok(job.write(job.deform(&nothing, &Poses::Shape(pose.to_vec()))?)?.into())
     }
 
     /// Exports the posed model in a format that stores only its shape, without rig or animation. `shown`: exports the
@@ -83,36 +90,26 @@ impl BoundDocument<'_> {
         format: ModelFormat,
         shown: Option<&Playback>,
     ) -> Result<Exported, BoundError> {
-        if let Some(capture) = self.posed_capture(id, format)? {
-            return Ok(capture);
-        }
-        let posed = match shown {
-            Some(playback) => playback.current_positions(*self)?,
-            None => self.deformed(&self.document().pose)?,
-        };
-        let member = self.document().models.get(id)?;
-        let bytes = member.model.write(format, member.share(&posed))?;
-        let lost = [member.model.lost_in(format), member.model.copies_in(format, &bytes)];
-        Ok(Exported { bytes, notices: lost.into_iter().flatten().collect() })
+        let shown = shown.map(|playback| playback.current_positions(*self)).transpose()?;
+        self.posed(id, &self.job(id, format, ReshapeOptions::default(), true)?, shown)
     }
 
     /// Exports a model as GLB with a morph target for each saved pose of the cage and the animation of the poses.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn poses(&self, id: u32, request: &RigOptions) -> Result<Vec<u8>, BoundError> {
+    pub fn poses(&self, id: u32, request: &RigOptions) -> Result<Exported, BoundError> {
         self.require_mesh()?;
-        let poses = self.document().fitting_poses();
-        let named: Vec<_> = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec())).collect();
-        if let Some((bytes, _)) = self.reshaped(id, self.rest(), &named, request)? {
-            return Ok(bytes);
-        }
-        let member = self.document().models.get(id)?;
-        let own =
-            |(name, pose): (String, Vec<Vec3>)| Ok((name, member.share(&self.deformed(&pose)?).to_vec()));
-        let named = named.into_iter().map(own).collect::<Result<Vec<_>, BoundError>>()?;
-        let timeline = self.document().timeline();
-        Ok(member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?)
+        let mut options = self.of_rig(self.rest(), request)?;
+        let is_vrm = self.document().models.get(id)?.model.vrm().is_some();
+        options.expressions = request.reshape.expressions && is_vrm && !request.plain;
+        let timeline = Some(self.document().timeline()).filter(|_| !options.expressions);
+        let all = self.document().fitting_poses();
+        let all =
+            all.map(|pose| NamedPose { name: pose.name.to_string(), positions: pose.positions.to_vec() });
+        let poses = Poses::Targets { all: all.collect(), timeline };
+        let job = self.job(id, ModelFormat::Gltf, options, request.plain)?;
+        Ok(job.write(job.deform(&MovedModel::new(*self, id, None)?, &poses)?)?.into())
     }
 
     /// Exports the weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
@@ -128,94 +125,36 @@ impl BoundDocument<'_> {
         Ok(write_weights_npz(&rows.weights, rows.frames, &rows.outside, &points, inner))
     }
 
-    /// Exports a posed capture of splats, or a posed point cloud; `None` for other models.
-    fn posed_capture(&self, id: u32, format: ModelFormat) -> Result<Option<Exported>, BoundError> {
-        let model = &self.document().models.get(id)?.model;
-        if model.n_faces() > 0 {
-            return Ok(None);
-        }
-        if self.document().is_posed() && self.lattice.is_none() {
-            let how = "wait until the splats follow the cage";
-            return Err(BoundError::Missing { what: "lattice", how });
-        }
-        let bytes = match self.field_of_splats() {
-            Some(field) => model.write_in_field(format, &field)?,
-            None => model.write(format, &model.positions)?,
-        };
-        Ok(Some(Exported { bytes, notices: model.lost_in(format).into_iter().collect() }))
-    }
-
     /// Rejects captures of splats and point clouds.
     fn require_mesh(&self) -> Result<(), BoundError> {
         if self.document().models.splats().is_none() { Ok(()) } else { Err(BoundError::Capture) }
     }
 
-    /// Exports a posed model as GLB.
-    pub(crate) fn posed_glb(&self, id: u32, request: &RigOptions) -> Result<Exported, BoundError> {
-        let pose = &self.document().pose;
-        if let Some((bytes, report)) = self.reshaped(id, pose, &[], request)? {
-            return Ok(Exported { bytes, notices: report.notices() });
-        }
-        let options = self.of_rig(pose, request)?;
-        let member = self.document().models.get(id)?;
-        let mut posed = member.share(&self.deformed(pose)?).to_vec();
-        member.model.lift(&mut posed, &options);
-        Ok(Exported { bytes: member.model.write_glb(&posed)?, notices: Vec::new() })
-    }
-
-    /// Exports a model as GLB whose morph targets are the frames of a clip, each deformed by the cage.
-    fn baked(&self, id: u32, clip: usize) -> Result<Exported, BoundError> {
-        let field = self.field()?;
-        let model = &self.document().models.get(id)?.model;
-        let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
-        frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
-        let notice = match frames.len() {
-            1 => "1 frame became a morph target; the skeleton is left out".to_owned(),
-            n => format!("{n} frames became morph targets; the skeleton is left out"),
-        };
-        Ok(Exported { bytes: model.write_baked(clip, &rest, frames)?, notices: vec![notice] })
-    }
-
-    /// Exports a rigged model in a pose of the cage, with `poses` as morph targets. Returns the bytes of the file and a
-    /// report. `None` if the model has no rig, or the options omit it.
-    fn reshaped(
+    /// Prepares the export of one model. `plain`: without its rig.
+    fn job(
         &self,
         id: u32,
-        pose: &[Vec3],
-        poses: &[(String, Vec<Vec3>)],
-        request: &RigOptions,
-    ) -> Result<Option<(Vec<u8>, ReshapeReport)>, BoundError> {
-        if request.plain {
-            return Ok(None);
-        }
-        let mut options = self.of_rig(pose, request)?;
-        if !poses.is_empty() {
-            let is_vrm = self.document().models.get(id)?.model.vrm().is_some();
-            options.expressions = request.reshape.expressions && is_vrm;
-            options.timeline = Some(self.document().timeline()).filter(|_| !options.expressions);
-        }
-        self.reshaped_as(id, pose, poses, options)
-    }
-
-    fn reshaped_as(
-        &self,
-        id: u32,
-        pose: &[Vec3],
-        poses: &[(String, Vec<Vec3>)],
+        format: ModelFormat,
         mut options: ReshapeOptions,
-    ) -> Result<Option<(Vec<u8>, ReshapeReport)>, BoundError> {
+        plain: bool,
+    ) -> Result<Job<Arc<Model>>, BoundError> {
         let member = self.document().models.get(id)?;
-        if !member.model.is_rigged() {
-            return Ok(None);
-        }
-        let moved = MovedModel::new(self, id)?;
-        let by_poses = poses.iter().map(|(name, pose)| Ok((name.clone(), moved.by(pose)?)));
-        let by_poses = by_poses.collect::<Result<Vec<_>, BoundError>>()?;
         // `rigid` may name parts of other models.
-        let props = moved.model.props()?;
+        let props = member.model.props()?;
         options.rigid.retain(|name| props.contains(name));
         options.parts = member.parts()?;
-        Ok(Some(moved.model.write_reshaped(&moved.by(pose)?, &moved.outside, &by_poses, &options)?))
+        Ok(Job::of_resolved(Arc::clone(&member.model), format, options, plain))
+    }
+
+    /// Writes a model in the current pose.
+    fn posed(
+        &self,
+        id: u32,
+        job: &Job<Arc<Model>>,
+        shown: Option<Vec<Vec3>>,
+    ) -> Result<Exported, BoundError> {
+        let pose = Poses::Shape(self.document().pose.to_vec());
+        Ok(job.write(job.deform(&MovedModel::new(*self, id, shown)?, &pose)?)?.into())
     }
 
     /// Builds the options for exporting the rig of a model. With several models, joints with the same name get the same
@@ -264,9 +203,15 @@ impl BoundDocument<'_> {
         let mut all = Ground::default();
         for member in self.document().models.iter() {
             let free = ReshapeOptions { feet: Feet::Free, ..options.clone() };
-            let found = if request.plain { None } else { self.reshaped_as(member.id, pose, &[], free)? };
-            let of_rig = found.and_then(|(_, report)| report.ground);
-            all.add(of_rig.unwrap_or_else(|| member.model.ground(member.share(&posed))));
+            let job = self.job(member.id, ModelFormat::Gltf, free, request.plain)?;
+            let of_rig = if job.keeps_rig() {
+                let moved = MovedModel::new(*self, member.id, None)?;
+                job.write(job.deform(&moved, &Poses::Shape(pose.to_vec()))?)?.rig
+            } else {
+                None
+            };
+            let ground = of_rig.and_then(|report| report.ground);
+            all.add(ground.unwrap_or_else(|| member.model.ground(member.share(&posed))));
         }
         Ok(all)
     }

@@ -73,7 +73,7 @@ impl ModelMotion {
     fn new(all: BoundDocument<'_>, id: u32, options: &RigOptions) -> Result<Self, BoundError> {
         let member = all.document().models.get(id)?;
         if member.model.format() == ModelFormat::Gltf && !options.dynamic {
-            let glb = all.posed_glb(id, options)?.bytes;
+            let glb = all.glb(id, options, None)?.bytes;
             return Ok(Self::Player(Box::new(member.model.player_of(&glb)?)));
         }
         if let Some(player) = member.model.player()? {

@@ -1,13 +1,10 @@
 //! Selects parts of a model by their names in the file.
 
-use cagework_core::deform::deform_bound;
-use cagework_core::{Frames, Weights};
 use cagework_pose::parts::{Parts, pieces};
-use glam::Vec3;
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::{GltfError, ReshapeOptions};
+use crate::gltf::GltfError;
 use crate::model::{Document, Model};
 use crate::part_kind::PartKind;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
@@ -58,33 +55,6 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Model {
-    /// Deforms the vertices of a model that is written without its rig: with the parts of `options` kept in place or
-    /// rigid, then lifted by [`Self::lift`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
-    /// weighted sums, which would add rounding.
-    ///
-    /// `weights`, `frames`: results of binding the model's vertices. `rest`, `posed`: `[n_controls]`, object units.
-    /// Returns `[n_vertices]`, object units.
-    ///
-    /// # Panics
-    /// As [`deform_bound`].
-    #[must_use]
-    pub fn deformed(
-        &self,
-        (weights, frames): (&Weights, &Frames),
-        (rest, posed): (&[Vec3], &[Vec3]),
-        options: &ReshapeOptions,
-    ) -> Vec<Vec3> {
-        let mut deformed = if posed == rest {
-            self.positions.clone()
-        } else {
-            let deformed = deform_bound(weights, frames, posed);
-            let parts = &options.parts;
-            if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
-        };
-        self.lift(&mut deformed, options);
-        deformed
-    }
-
     /// Finds the vertices of the parts called `name`, ascending. `name` starts with a kind, as in `material:skin`,
     /// `node:Buckle`, `joint:Head` or `group:eyes`, or is unique without a kind.
     ///

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use cagework_job::JobError;
 use pyo3::PyErr;
 
 /// Imports exception classes, and defines for each a function that creates the exception from an error.
@@ -29,4 +30,28 @@ exceptions! {
     option: OptionError,
     /// Invalid grabs, pins or targets.
     pull: PullError,
+}
+
+/// Creates the exception for an error of deforming a file.
+pub(crate) fn job(error: JobError) -> PyErr {
+    match error {
+        JobError::Bind(error) => bind(error),
+        JobError::NoPoses => array(error),
+        JobError::NeedsMesh { .. }
+        | JobError::NoFeet
+        | JobError::NoVrm { .. }
+        | JobError::ClipFormat { .. }
+        | JobError::FormatPoses { .. }
+        | JobError::OnePose { .. }
+        | JobError::NoAnimation { .. }
+        | JobError::Times { .. }
+        | JobError::Timeline(_) => option(error),
+        JobError::NoSkeleton
+        | JobError::OtherCage { .. }
+        | JobError::RigPoints { .. }
+        | JobError::Unbound
+        | JobError::Select(_)
+        | JobError::Memory { .. }
+        | JobError::Write(_) => model(error),
+    }
 }

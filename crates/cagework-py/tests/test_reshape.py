@@ -179,13 +179,13 @@ def test_one_cage_encloses_several_models(rigged):
 @pytest.mark.parametrize(
     ("posed", "options", "message"),
     [
-        ("dict", {"ground": True}, "ground and feet"),
+        ("dict", {"ground": True}, "on its ground takes one pose"),
         ("dict", {"times": [1.0, 2.0]}, r"times: expected one number per pose \(1\), got 2"),
         ("dict", {"times": [-1.0]}, "the time of pose 1 is -1 s"),
-        ("dict", {"skeleton": rigged_glb()}, "skeleton needs one pose"),
-        ("array", {"expressions": True}, "need a dict of poses"),
+        ("dict", {"skeleton": rigged_glb()}, "a shared skeleton takes one pose"),
+        ("array", {"expressions": True}, "expressions: one pose gives the deformed model"),
         ("array", {"feet": "glue"}, "feet: .*free, lock"),
-        ("array", {"static": True, "feet": "lock"}, "needs a model with a skeleton"),
+        ("array", {"static": True, "feet": "lock"}, "need a model with a skeleton"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(rigged, posed, options, message):

@@ -72,7 +72,7 @@ def test_reshape_writes_captures_and_clouds_as_the_command_does(capture, cage, t
     vertices = np.loadtxt(body.splitlines())
     assert np.allclose(vertices, points @ QUARTER.T, atol=1e-5)
     assert np.allclose(cw.Splats(tmp_path / "out-a.splat").positions, points @ QUARTER.T, atol=1e-5)
-    with pytest.raises(cw.OptionError, match="take one pose"):
+    with pytest.raises(cw.OptionError, match="takes one pose"):
         cw.reshape(tmp_path / "a.splat", cage, {"a": turned})
 
 

@@ -11,6 +11,7 @@ use cagework_core::{BindError, ClosedFormError, ControlError};
 use cagework_editor::{BoundError, EditError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
+use cagework_job::JobError;
 use cagework_pose::pull::PullError;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
@@ -129,6 +130,15 @@ impl From<BindError> for Fault {
     }
 }
 
+impl From<JobError> for Fault {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::Bind(error) => error.into(),
+            error => Self::new(ErrorName::Error, error),
+        }
+    }
+}
+
 impl From<EditError> for Fault {
     fn from(error: EditError) -> Self {
         let is_missing = matches!(error, EditError::NoModel | EditError::NoCage);
@@ -142,6 +152,7 @@ impl From<BoundError> for Fault {
             BoundError::Missing { .. } => Self::new(ErrorName::Missing, error),
             BoundError::Edit(error) => error.into(),
             BoundError::Read(error) => error.into(),
+            BoundError::Job(error) => error.into(),
             _ => Self::new(ErrorName::Error, error),
         }
     }

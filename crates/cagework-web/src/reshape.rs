@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use cagework_core::deform::{deform_finite, displacements};
-use cagework_core::field::{CELLS, FieldWeights, Lattice};
-use cagework_core::options::{OutsidePolicy, UnknownWord};
-use cagework_core::{Binding, Controls, Frames, Weights};
+use cagework_core::deform::deform_finite;
+use cagework_core::options::UnknownWord;
+use cagework_core::{Controls, Frames, Weights};
 use cagework_editor::{PageBindOptions, RigOptions};
-use cagework_io::{Model, ModelFormat, ReshapeOptions};
-use cagework_pose::Parts;
+use cagework_io::Model;
+use cagework_job::{BoundPoints, Job, JobOptions, Poses};
 use cagework_pose::humanoid::Bone;
 use cagework_pose::proportions::{HumanoidCage, Proportions};
 use js_sys::{Array, Float32Array, Function, Uint32Array};
@@ -72,39 +71,25 @@ impl Binder {
         loaded: &LoadedModel,
         #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
         posed: Vec<f32>,
-        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions", js_name = options)] bind_options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] rig: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Answer<Vec<u8>> {
-        let (model, rig): (&Model, RigOptions) = (&loaded.model, decode(rig)?);
+        let RigOptions { reshape, plain: shape_only, .. } = decode(rig)?;
+        let options = JobOptions { reshape, shape_only, ..JobOptions::default() };
+        let job = Job::new(&loaded.model, loaded.model.format(), &options)?;
         let set = control_set(cage)?;
-        let rest = Controls::from(&set).rest().to_vec();
-        let posed = pose(&posed, rest.len())?;
-        let keeps_rig = model.is_rigged() && !rig.plain;
-        let of_rig = of_model(model, &rig)?;
-        let extra = if keeps_rig { model.extra_points()? } else { Vec::new() };
-        let at = [model.positions.as_slice(), &extra].concat();
-        let mut request: PageBindOptions = decode(options)?;
-        request.options.extra_points = extra.len();
-        // Count the memory for writing the file against the limit, so that a lack of memory is reported before the
-        // bind.
-        request.options.held = model.bytes() + model.bytes_to_write(model.format());
-        if model.n_faces() == 0 {
-            let lattice = Lattice::new(Controls::from(&set).surface(), CELLS);
-            request.options.outside = OutsidePolicy::Extend;
-            let Binding { weights, frames, .. } =
-                self.run(&lattice.points(), &set, request, progress).await?;
-            let field = FieldWeights::new(lattice, weights, frames).pose(&rest, &posed);
-            return Ok(model.write_in_field(model.format(), &field)?);
-        }
-        let bound = self.run(&at, &set, request, progress).await?;
-        if keeps_rig && model.format() == ModelFormat::Gltf {
-            let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
-            let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
-            return Ok(model.write_reshaped(&by, &outside, &[], &of_rig)?.0);
-        }
-        let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig);
-        Ok(model.write(model.format(), &deformed)?)
+        let poses = Poses::Shape(pose(&posed, Controls::from(&set).n_controls())?);
+        let mut request: PageBindOptions = decode(bind_options)?;
+        let bound = match job.points(&set, &poses, &request.options)? {
+            None => BoundPoints::nothing(Controls::from(&set).rest().to_vec()),
+            Some(points) => {
+                request.options = points.options;
+                let binding = self.run(&points.positions, &set, request, progress).await?;
+                points.bound(binding, &set)
+            }
+        };
+        Ok(job.write(job.deform(&bound, &poses)?)?.bytes)
     }
 }
 
@@ -150,20 +135,6 @@ impl Binder {
         let posed = posed.with_bind(&bound.weights, &model.positions, &rig, &humanoid);
         Ok(flat(&posed.pose(&proportions)))
     }
-}
-
-/// Prepares the export options of a model. Splits the names of rigid parts into attachments of the skeleton and other
-/// parts.
-fn of_model(model: &Model, rig: &RigOptions) -> Answer<ReshapeOptions> {
-    let options = rig.reshape.clone();
-    let props = if rig.plain { Vec::new() } else { model.props()? };
-    let (rigid, others): (Vec<_>, Vec<_>) = options.rigid.into_iter().partition(|name| props.contains(name));
-    let parts = if others.is_empty() {
-        Parts::default()
-    } else {
-        model.parts(&[], &others).map_err(|e| Fault::new(ErrorName::Error, e))?
-    };
-    Ok(ReshapeOptions { rigid, parts, ..options })
 }
 
 /// Weights for deforming points by many poses.

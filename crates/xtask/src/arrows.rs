@@ -39,19 +39,32 @@ const RULES: &[Rule] = &[
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
+        name: "cagework-job",
+        may_use: &["cagework-core", "cagework-io", "cagework-pose"],
+        // wasm-bindgen is allowed: on wasm32, cagework-io depends on it through zip.
+        must_not_use: &["wgpu", "naga", "web-sys", "clap"],
+    },
+    Rule {
         name: "cagework-editor",
-        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-pose"],
+        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-job", "cagework-pose"],
         // wasm-bindgen is allowed: on wasm32, cagework-io depends on it through zip.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
         name: "cagework-cli",
-        may_use: &["cagework-cage", "cagework-core", "cagework-gpu", "cagework-io", "cagework-pose"],
+        may_use: &[
+            "cagework-cage",
+            "cagework-core",
+            "cagework-gpu",
+            "cagework-io",
+            "cagework-job",
+            "cagework-pose",
+        ],
         must_not_use: &[],
     },
     Rule {
         name: "cagework-py",
-        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-pose"],
+        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-job", "cagework-pose"],
         must_not_use: &["wgpu", "clap"],
     },
     Rule {
@@ -67,6 +80,7 @@ const RULES: &[Rule] = &[
             "cagework-editor",
             "cagework-gpu",
             "cagework-io",
+            "cagework-job",
             "cagework-pose",
         ],
         must_not_use: &["clap", "rayon"],
@@ -80,6 +94,7 @@ const RULES: &[Rule] = &[
             "cagework-editor",
             "cagework-gpu",
             "cagework-io",
+            "cagework-job",
             "cagework-pose",
             "cagework-tests",
         ],

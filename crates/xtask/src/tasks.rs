@@ -176,7 +176,9 @@ fn check_files() -> Result<(), String> {
     // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a
     // release.
     let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
-    for name in ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-gpu"] {
+    for name in
+        ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-job", "cagework-gpu"]
+    {
         package.extend(["-p", name]);
     }
     run("cargo", &package, &[])

@@ -51,11 +51,12 @@ const ARTIFACTS: [Artifact; 2] = [
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// Files and folders that the packages are built from.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 11] = [
     "crates/cagework-core",
     "crates/cagework-cage",
     "crates/cagework-pose",
     "crates/cagework-io",
+    "crates/cagework-job",
     "crates/cagework-editor",
     "crates/cagework-gpu",
     "crates/cagework-web",

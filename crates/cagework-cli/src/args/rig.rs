@@ -1,11 +1,8 @@
 //! Arguments for rigged models, and for parts of models that the cage does not bend.
 
-use std::path::Path;
-
-use cagework_io::{Feet, Joints, Model, ReshapeOptions, ReshapeReport, SelectError, shown};
+use cagework_io::{Feet, Joints, ReshapeOptions, ReshapeReport};
+use cagework_job::JobOptions;
 use clap::Args;
-
-use crate::error::CliError;
 
 /// Arguments that select parts of the model which the cage does not bend.
 #[derive(Args, Debug)]
@@ -56,84 +53,18 @@ pub(crate) struct RigArgs {
 }
 
 impl RigArgs {
-    /// Returns options for deforming a rigged model, and notices about ambiguous part names.
-    ///
-    /// # Errors
-    /// If no part of the model has a given name.
-    pub(crate) fn options(
-        &self,
-        model: &Model,
-        path: &Path,
-    ) -> Result<(ReshapeOptions, Vec<String>), CliError> {
-        self.options_with(model, path, &self.parts)
-    }
-
-    /// Returns options for deforming one of many models, the names of `--rigid` and `--mask` that this model lacks, and
-    /// notices about ambiguous part names.
-    ///
-    /// # Errors
-    /// If the rig cannot be read.
-    pub(crate) fn options_for_one(
-        &self,
-        model: &Model,
-        path: &Path,
-    ) -> Result<(ReshapeOptions, Vec<String>, Vec<String>), CliError> {
-        let props = self.props(model, path)?;
-        let mut missing = Vec::new();
-        let mut is_there = |name: &String| {
-            let there =
-                props.contains(name) || !matches!(model.select(name), Err(SelectError::Unknown { .. }));
-            if !there {
-                missing.push(name.clone());
-            }
-            there
+    /// Returns the options of a job. `for_many`: whether they apply to many models.
+    pub(crate) fn job_options(&self, for_many: bool) -> JobOptions {
+        let Self { joints, keep_travel, ground, feet, parts: PartArgs { rigid, mask }, shape_only } = self;
+        let reshape = ReshapeOptions {
+            joints: *joints,
+            keep_travel: *keep_travel,
+            rigid: rigid.clone(),
+            ground: *ground,
+            feet: *feet,
+            ..ReshapeOptions::default()
         };
-        let PartArgs { rigid, mask } = &self.parts;
-        let rigid = rigid.iter().filter(|name| is_there(name)).cloned().collect();
-        let mask = mask.iter().filter(|(name, _)| is_there(name)).cloned().collect();
-        let (options, notices) = self.options_with(model, path, &PartArgs { rigid, mask })?;
-        Ok((options, missing, notices))
-    }
-
-    /// Rejects `--ground` and `--feet lock` where they have no effect.
-    ///
-    /// # Errors
-    /// If there are several poses, or no skeleton for `--feet lock`.
-    pub(crate) fn check_clips(&self, model: &Model, path: &Path, n_poses: usize) -> Result<(), CliError> {
-        if n_poses > 1 && (self.ground || self.feet == Feet::Lock) {
-            return Err(CliError::Mismatch {
-                message: format!("--ground and --feet lock take one pose, but there are {n_poses}"),
-                hint: "run the command once per pose",
-            });
-        }
-        if self.feet == Feet::Lock && !model.is_rigged() {
-            return Err(CliError::file(
-                path,
-                "has no skeleton whose feet could be held: leave out --feet lock",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Rejects the options of rigs and parts for a deformation that cannot follow them, such as that of points.
-    /// `of_rig`: also rejects options that only change skeletons and clips. `why`: the reason, as a sentence.
-    ///
-    /// # Errors
-    /// If one of these options is given.
-    pub(crate) fn refuse(&self, of_rig: bool, why: &str, hint: &'static str) -> Result<(), CliError> {
-        let given = [
-            ("--ground", self.ground),
-            ("--rigid", !self.parts.rigid.is_empty()),
-            ("--mask", !self.parts.mask.is_empty()),
-            ("--joints", of_rig && self.joints != Joints::default()),
-            ("--feet", of_rig && self.feet != Feet::default()),
-            ("--keep-travel", of_rig && self.keep_travel),
-            ("--static", of_rig && self.shape_only),
-        ];
-        match given.iter().find(|(_, is_given)| *is_given) {
-            Some((option, _)) => Err(CliError::Mismatch { message: format!("{option}: {why}"), hint }),
-            None => Ok(()),
-        }
+        JobOptions { reshape, mask: mask.clone(), shape_only: *shape_only, for_many, ..JobOptions::default() }
     }
 
     /// Whether `--joints stay` leaves the skeleton at rest.
@@ -151,45 +82,4 @@ impl RigArgs {
     pub(crate) fn part_names(&self) -> impl Iterator<Item = &String> {
         self.parts.rigid.iter().chain(self.parts.mask.iter().map(|(name, _)| name))
     }
-
-    fn props(&self, model: &Model, path: &Path) -> Result<Vec<String>, CliError> {
-        if self.shape_only { Ok(Vec::new()) } else { model.props().map_err(|e| CliError::file(path, e)) }
-    }
-
-    fn options_with(
-        &self,
-        model: &Model,
-        path: &Path,
-        parts: &PartArgs,
-    ) -> Result<(ReshapeOptions, Vec<String>), CliError> {
-        let props = self.props(model, path)?;
-        let (rigid, others): (Vec<_>, Vec<_>) =
-            parts.rigid.iter().cloned().partition(|name| props.contains(name));
-        let mut notices = Vec::new();
-        let others: Vec<String> = others.iter().map(|name| with_kind(model, name, &mut notices)).collect();
-        let mask = parts.mask.iter().map(|(name, amount)| (with_kind(model, name, &mut notices), *amount));
-        let mask: Vec<_> = mask.collect();
-        let parts = model.parts(&mask, &others).map_err(|e| CliError::file(path, e))?;
-        let (joints, keep_travel) = (self.joints, self.keep_travel);
-        let (ground, feet) = (self.ground, self.feet);
-        Ok((
-            ReshapeOptions { joints, keep_travel, rigid, parts, ground, feet, ..ReshapeOptions::default() },
-            notices,
-        ))
-    }
-}
-
-/// Returns the part name. If parts of several kinds share it, prefixes it with the first kind, and adds a notice about
-/// the others.
-fn with_kind(model: &Model, name: &str, notices: &mut Vec<String>) -> String {
-    let Err(SelectError::Ambiguous { choices, .. }) = model.select(name) else { return name.to_owned() };
-    let names: Vec<&str> = choices.iter().map(|choice| choice.trim_matches('\'')).collect();
-    let [first, others @ ..] = names.as_slice() else { return name.to_owned() };
-    notices.push(format!(
-        "'{}' means {}; for the other part write {}",
-        shown(name),
-        shown(first),
-        shown(&others.join(" or "))
-    ));
-    (*first).to_owned()
 }

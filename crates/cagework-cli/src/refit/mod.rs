@@ -10,19 +10,16 @@ use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 use cagework_core::bind::{BindError, SolvedCage};
-use cagework_core::deform::displacements;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Cancellation;
-use cagework_core::{Binding, Controls};
-use cagework_io::{
-    Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown, without_byte_order_mark,
-};
+use cagework_core::{BindReport, Controls};
+use cagework_io::{Model, ModelFormat, Skeleton, shown, without_byte_order_mark};
+use cagework_job::{BoundPoints, Deformed, Job, JobOptions, Poses, require_memory};
 use glam::{DVec3, Vec3};
 
 use crate::args::{ModelOutput, RefitArgs};
-use crate::bind::{bind_positions, check_memory};
+use crate::bind::bind_positions;
 use crate::controls::with_inner;
-use crate::deform::{Deformation, Poses, pose_name};
 use crate::error::CliError;
 use crate::files::{
     check_outputs, is_newer, json, make_folder, models_of_folders, print, read, read_beside,
@@ -30,13 +27,12 @@ use crate::files::{
 };
 use crate::load::{load_cage_file, load_model, load_with_clips};
 use crate::progress::Bar;
-use crate::rig;
 use crate::signals::{self, CancelGuard};
 
 use report::{ModelEntry, ModelReport, Outcome, RefitSummary, print_entry, text};
 
 /// A model to read, and the file to write it to.
-struct Job {
+struct Refit {
     model: PathBuf,
     output: ModelOutput,
 }
@@ -57,17 +53,16 @@ struct Binder<'a> {
 
 /// A deformed model that is ready to be written.
 struct DeformedModel<'a> {
-    job: &'a Job,
-    model: Model,
-    deformation: Deformation,
-    options: ReshapeOptions,
+    refit: &'a Refit,
+    job: Job<Model>,
+    deformed: Deformed,
     /// Report of the model. The total time and the report of its rig are added after writing.
     report: ModelReport,
     started: Instant,
 }
 
 /// The job that another thread is writing, and the handle of that thread; `None` if no job is being written.
-type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
+type Writing<'scope, 'a> = Option<(&'a Refit, ScopedJoinHandle<'scope, Outcome>)>;
 
 /// A model is written while the next one is read, unless writing it needs more than the memory limit divided by this.
 const PARALLEL_MEMORY_DIVISOR: u64 = 16;
@@ -107,17 +102,15 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let controls = cage.controls();
     let inner = &controls.rest()[cage.cage.n_vertices()..];
     let pose = cage.load_pose(&args.pose)?;
-    let poses = Poses {
-        names: vec![pose_name(&args.pose)],
-        rest: controls.rest().to_vec(),
-        positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, (up, cage.origin()), memory)?,
-    };
+    let files = args.pose_controls.as_slice();
+    let pose = with_inner(vec![pose], files, inner, (up, cage.origin()), memory)?.remove(0);
     let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
     let mut binder =
         Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), skeleton: None, unnamed };
-    binder.skeleton = binder.skeleton_of(&jobs, &poses)?.map(Arc::new);
+    binder.skeleton = binder.skeleton_of(&jobs, &pose)?.map(Arc::new);
+    let poses = Poses::Shape(pose);
     let mut models = Vec::with_capacity(jobs.len());
-    let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
+    let mut settle = |job: &Refit, outcome: Outcome| -> Result<(), CliError> {
         // If a signal cancelled a model, do not report it as failed.
         if matches!(outcome, Outcome::Failed { .. }) && signals::cancelled() {
             return Ok(());
@@ -133,15 +126,14 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
         for job in jobs.iter().take_while(|_| !signals::cancelled()) {
             let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
             let is_done = args.resume && is_newer(&job.output.path, &inputs);
-            let deformed = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
+            let deformed = if is_done { None } else { Some(binder.refit(job, &poses)) };
             settle_one(&mut writing, &mut settle)?;
             match deformed {
                 None => settle(job, Outcome::Skipped)?,
                 Some(Err(error)) => settle(job, Outcome::of_error(&error, &job.model))?,
                 Some(Ok(deformed)) => {
                     let is_large = deformed.bytes() > args.read.memory.bytes() / PARALLEL_MEMORY_DIVISOR;
-                    let names = &poses.names;
-                    writing = Some((job, scope.spawn(move || deformed.write(names))));
+                    writing = Some((job, scope.spawn(move || deformed.write())));
                     if is_large {
                         settle_one(&mut writing, &mut settle)?;
                     }
@@ -173,7 +165,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
 ///
 /// # Errors
 /// If the manifest cannot be read or names no model, or two models have the same output.
-fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
+fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Refit>, CliError> {
     let mut models = args.models.clone();
     if let Some(path) = &args.manifest {
         let bytes = read(path)?;
@@ -214,104 +206,66 @@ fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
                 hint: "rename one of them, or run the command once for each, with different -o",
             });
         }
-        jobs.push(Job { model: model.clone(), output });
+        jobs.push(Refit { model: model.clone(), output });
     }
     Ok(jobs)
 }
 
 impl Binder<'_> {
     /// Reads, binds and deforms a model.
-    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<DeformedModel<'j>, CliError> {
+    fn refit<'j>(&self, refit: &'j Refit, poses: &Poses) -> Result<DeformedModel<'j>, CliError> {
         let started = Instant::now();
-        let Self { args, controls, .. } = self;
-        let (path, format) = (&job.model, job.output.format);
+        let Self { args, .. } = self;
+        let (path, format) = (&refit.model, refit.output.format);
         // Joints of files of clips without a mesh take their moves from the body.
         let can_be_clips = args.skeleton.is_some() && format == ModelFormat::Gltf;
         let load = if can_be_clips { load_with_clips } else { load_model };
         let mut model = load(path, args.read.axis(), args.read.memory)?;
         model.set_origin(self.origin);
-        if model.positions.is_empty() {
-            return self.of_clips(job, model, started);
-        }
-        let is_static = args.rig.shape_only || format != ModelFormat::Gltf;
-        let (points, extra_points) =
-            if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
-        let (options, missing, of_names) = args.rig.options_for_one(&model, path)?;
-        let options = ReshapeOptions { skeleton: self.skeleton.clone(), ..options };
-        let held = model.bytes();
-        let Binding { weights, frames, outside, report } = self.bind(&points, held, extra_points)?;
-        let options_with_fields = BindOptions { held: held + self.field_bytes(), ..self.options() };
-        check_memory(&options_with_fields, points.len(), *controls, model.bytes_to_write(format))?;
-        let saved = SavedWeights {
-            weights,
-            frames,
-            outside,
-            extra_points: points[model.positions.len()..].to_vec(),
-            inner_controls: inner.to_vec(),
-        };
-        let deform_start = Instant::now();
-        let deformation = Deformation::new(&model, saved, poses, format, (&options, args.rig.shape_only));
-        let deform_ms = elapsed_ms(deform_start);
-        let mut notices = model.notices.clone();
-        notices.extend(of_names);
-        notices.extend(missing.iter().map(|name| format!("this model has no part called '{}'", shown(name))));
-        self.unnamed.borrow_mut().retain(|name| missing.contains(name));
-        if !report.converged {
-            notices.push(format!(
-                "the solve did not converge within {} iterations: raise --max-iterations or --tau",
-                report.iterations
-            ));
-        }
-        let report = ModelReport {
+        let mut report = ModelReport {
             vertices: model.positions.len(),
-            outside_vertices: report.outside_vertices as usize,
-            bind_ms: report.timings_ms.total,
-            deform_ms,
-            total_ms: 0.0,
-            rig: None,
-            notices,
+            notices: model.notices.clone(),
+            ..ModelReport::default()
         };
-        Ok(DeformedModel { job, model, deformation, options, report, started })
-    }
-
-    /// Prepares a file of clips without a mesh. Binds nothing: its joints move as those with the same names in the
-    /// shared skeleton.
-    fn of_clips<'j>(
-        &self,
-        job: &'j Job,
-        model: Model,
-        started: Instant,
-    ) -> Result<DeformedModel<'j>, CliError> {
-        let (options, _, _) = self.args.rig.options_for_one(&model, &job.model)?;
-        let (_, n) = rig::points(&model, &job.model)?;
-        let report = ModelReport { notices: model.notices.clone(), ..ModelReport::default() };
-        let deformation = Deformation::Rig { by: vec![vec![DVec3::ZERO; n]], outside: Vec::new() };
-        let options = ReshapeOptions { skeleton: self.skeleton.clone(), ..options };
-        Ok(DeformedModel { job, model, deformation, options, report, started })
+        let mut options = args.rig.job_options(true);
+        options.reshape.skeleton.clone_from(&self.skeleton);
+        let wrong = |e| CliError::job(path, e);
+        let job = Job::new(model, format, &options).map_err(wrong)?;
+        let (bound, of_bind) = self.bind(&job, poses, path)?;
+        let deform_start = Instant::now();
+        let deformed = job.deform(&bound, poses).map_err(wrong)?;
+        report.deform_ms = elapsed_ms(deform_start);
+        if let Some(of_bind) = of_bind {
+            let missing = job.missing_parts();
+            let lacks = |name: &String| format!("this model has no part called '{}'", shown(name));
+            report.notices.extend(missing.iter().map(lacks));
+            self.unnamed.borrow_mut().retain(|name| missing.contains(name));
+            report.outside_vertices = of_bind.outside_vertices as usize;
+            report.bind_ms = of_bind.timings_ms.total;
+            if !of_bind.converged {
+                report.notices.push(format!(
+                    "the solve did not converge within {} iterations: raise --max-iterations or --tau",
+                    of_bind.iterations
+                ));
+            }
+        }
+        Ok(DeformedModel { refit, job, deformed, report, started })
     }
 
     /// Builds the skeleton that all models share, with joints identified by name: how the joints of the `--skeleton`
     /// body move, or, without `--skeleton`, which joints carry vertices in any of the models. `None` if the joints of
     /// each model depend on that model alone.
-    fn skeleton_of(&self, jobs: &[Job], poses: &Poses) -> Result<Option<Skeleton>, CliError> {
+    fn skeleton_of(&self, jobs: &[Refit], pose: &[Vec3]) -> Result<Option<Skeleton>, CliError> {
         let Self { args, .. } = self;
         let (up, memory) = (args.read.axis(), args.read.memory);
         if let Some(path) = &args.skeleton {
             let mut model = load_model(path, up, memory)?;
             model.set_origin(self.origin);
-            if !model.is_rigged() {
-                return Err(CliError::file(
-                    path,
-                    "has no skeleton: give the body that the models were made for",
-                ));
-            }
-            let (points, extra_points) = rig::points(&model, path)?;
-            let Binding { weights, frames, outside, .. } = self.bind(&points, model.bytes(), extra_points)?;
-            let by = displacements(&weights, &frames, &poses.rest, &poses.positions[0]);
-            let outside: Vec<u32> = outside.iter().map(|o| o.vertex).collect();
-            let (options, _, _) = args.rig.options_for_one(&model, path)?;
-            let skeleton = model.skeleton(&by, &outside, &options).map_err(|e| CliError::file(path, e))?;
-            return Ok(Some(skeleton));
+            let options = JobOptions { shape_only: false, ..args.rig.job_options(true) };
+            let wrong = |e| CliError::job(path, e);
+            let job = Job::new(model, ModelFormat::Gltf, &options).map_err(wrong)?;
+            let (bound, _) = self.bind(&job, &Poses::Shape(pose.to_vec()), path)?;
+            return Ok(Some(job.skeleton(&bound, pose).map_err(wrong)?));
         }
         if args.rig.ground && jobs.len() > 1 {
             return Err(CliError::Mismatch {
@@ -343,20 +297,35 @@ impl Binder<'_> {
         self.solved.get().and_then(Option::as_ref).map_or(0, SolvedCage::bytes)
     }
 
-    fn bind(&self, points: &[Vec3], held: u64, extra_points: usize) -> Result<Binding, CliError> {
-        let options = self.options();
+    /// Binds what a job needs. Also returns the report of the bind; `None` if there is nothing to bind.
+    fn bind(
+        &self,
+        job: &Job<Model>,
+        poses: &Poses,
+        path: &Path,
+    ) -> Result<(BoundPoints, Option<BindReport>), CliError> {
+        let points = job.points(self.controls, poses, &self.options());
+        let Some(points) = points.map_err(|e| CliError::job(path, e))? else {
+            return Ok((BoundPoints::nothing(self.controls.rest().to_vec()), None));
+        };
         if self.solved.get().is_none() {
-            let solved = match SolvedCage::new(self.controls, &options, &Bar::start()) {
+            let solved = match SolvedCage::new(self.controls, &self.options(), &Bar::start()) {
                 Err(BindError::Memory { .. }) => None,
                 solved => Some(solved?),
             };
             // Cannot fail: the cell is empty.
             let _ = self.solved.set(solved);
         }
-        match self.solved.get() {
-            Some(Some(solved)) => Ok(solved.bind(points, (held, extra_points), &Bar::start())?),
-            _ => bind_positions(points, self.controls, false, &BindOptions { held, extra_points, ..options }),
-        }
+        let BindOptions { held, extra_points, .. } = points.options;
+        let binding = match self.solved.get() {
+            Some(Some(solved)) => solved.bind(&points.positions, (held, extra_points), &Bar::start())?,
+            _ => bind_positions(&points.positions, self.controls, false, &points.options)?,
+        };
+        let with_fields = BindOptions { held: held + self.field_bytes(), ..points.options };
+        let to_write = job.model().bytes_to_write(job.format());
+        require_memory(&with_fields, points.positions.len(), self.controls, to_write)?;
+        let report = binding.report.clone();
+        Ok((points.bound(binding, self.controls), Some(report)))
     }
 
     fn summary(&self, models: Vec<ModelEntry>) -> RefitSummary {
@@ -398,23 +367,19 @@ impl Binder<'_> {
 impl DeformedModel<'_> {
     /// Memory that the model occupies until it has been written, bytes.
     fn bytes(&self) -> u64 {
-        self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
+        self.job.model().bytes() + self.job.model().bytes_to_write(self.job.format())
     }
 
-    fn write(self, names: &[String]) -> Outcome {
-        let Self { job, model, deformation, options, mut report, started } = self;
-        let encoded = deformation.into_file(&model, names, &job.output, &options).and_then(|(bytes, rig)| {
-            report.notices.extend(model.copies_in(job.output.format, &bytes));
-            write(&job.output.path, &bytes)?;
-            Ok(rig)
-        });
-        match encoded {
-            Err(error) => Outcome::of_error(&error, &job.model),
-            Ok(rig) => {
-                report.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
-                report.notices.extend(model.lost_in(job.output.format));
+    fn write(self) -> Outcome {
+        let Self { refit, job, deformed, mut report, started } = self;
+        let path = &refit.output.path;
+        let written = job.write(deformed).map_err(|e| CliError::job(path, e));
+        match written.and_then(|written| write(path, &written.bytes).map(|()| written)) {
+            Err(error) => Outcome::of_error(&error, &refit.model),
+            Ok(written) => {
+                report.notices.extend(written.notices);
                 report.total_ms = elapsed_ms(started);
-                Outcome::Written(Box::new(ModelReport { rig, ..report }))
+                Outcome::Written(Box::new(ModelReport { rig: written.rig, ..report }))
             }
         }
     }
@@ -423,7 +388,7 @@ impl DeformedModel<'_> {
 /// Waits until the model that is being written, if any, is finished, and passes its outcome to `settle`.
 fn settle_one<'a>(
     writing: &mut Writing<'_, 'a>,
-    settle: &mut impl FnMut(&'a Job, Outcome) -> Result<(), CliError>,
+    settle: &mut impl FnMut(&'a Refit, Outcome) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
     let Some((job, thread)) = writing.take() else { return Ok(()) };
     match thread.join() {

@@ -80,10 +80,10 @@ fn times_and_interpolation_of_the_animation_are_as_given() {
     assert_eq!(animation("--times 0,1.25 --interpolation step"), (1.25, 2, 4, "STEP".into()));
     assert_eq!(animation("--interpolation cubic"), (3.0, 4, 24, "CUBICSPLINE".into()));
     for (options, message) in [
-        ("--times 1", "--times: 1 time for 2 poses"),
-        ("--times 1,2,3", "give one time per pose"),
+        ("--times 1", "times: expected one number per pose (2), got 1"),
+        ("--times 1,2,3", "expected one number per pose (2), got 3"),
         ("--times 2,1", "the time of pose 2 is 1 s, but the previous pose is at 2 s"),
-        ("--times 1,1", "give the poses in the order of their times"),
+        ("--times 1,1", "the time of pose 2 is 1 s, but the previous pose is at 1 s"),
         ("--times 0,-1", "not a number of seconds from 0 to 3600"),
         ("--times 0,nan", "not a number of seconds from 0 to 3600"),
         ("--times 0,1e9", "not a number of seconds from 0 to 3600"),
@@ -104,7 +104,7 @@ fn poses_above_the_memory_limit_are_rejected_before_they_are_computed() {
     bound()
         .run(&format!("deform mesh.obj --cage cage.obj --weights w.npz{many} -o out.glb --memory-limit 4"))
         .code(1)
-        .stderr(contains("out.glb: for 300 poses it needs about").and(contains("limit of 4 MiB")));
+        .stderr(contains("out.glb: with 300 morph targets it needs about").and(contains("limit of 4 MiB")));
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn several_poses_are_rejected_for_obj() {
     bound()
         .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o out.obj")
         .code(1)
-        .stderr(contains("one pose, but there are 2").and(contains("hint: ")));
+        .stderr(contains("format obj stores one pose, but there are 2: write a .glb"));
 }
 
 #[test]

@@ -310,7 +310,7 @@ fn clips_without_a_mesh_follow_the_body() {
     for (args, message) in [
         ("other.glb --skeleton humanoid.glb", "none of its nodes has the name of a joint of the skeleton"),
         ("walk.glb --skeleton nameless.glb", "none of its nodes has the name of a joint of the skeleton"),
-        ("walk.glb --skeleton cage.obj", "cage.obj: has no skeleton"),
+        ("walk.glb --skeleton cage.obj", "cage.obj: the model has no skeleton"),
         ("walk.glb --skeleton missing.glb", "missing.glb: there is no such file"),
     ] {
         let refit = format!("refit {args} --cage cage.obj --pose wide.obj -g 24 -o out2");

@@ -166,7 +166,7 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
     sandbox
         .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
         .failure()
-        .stderr(contains("--dynamic takes one pose, but 2 were given"));
+        .stderr(contains("a clip that the cage bends takes one pose, but there are 2"));
     sandbox
         .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj -o bent.obj"))
         .failure()
@@ -197,7 +197,7 @@ fn poses_are_morph_targets_with_the_given_names() {
     for (names, message) in [
         ("--name wide", "--name: 1 name for 2 files of poses"),
         ("--name wide --name wide", "--name: 'wide' is given twice"),
-        ("--name wide --name rest --expression", "humanoid.glb has no VRM data"),
+        ("--name wide --name rest --expression", "humanoid.glb: expressions need a VRM"),
     ] {
         sandbox.run(&format!("{poses} {names} -o out.glb")).code(1).stderr(contains(message));
     }
@@ -372,13 +372,10 @@ fn ground_and_feet_are_options_of_one_pose() {
     let held = sandbox.json(&format!("{DEFORM} --pose wide.obj --feet lock -o out.glb --json"));
     assert_eq!(held["feet"][0], 2, "{held}");
     for (args, message) in [
-        (
-            "--pose low.obj --pose wide.obj --ground",
-            "--ground and --feet lock take one pose, but there are 2",
-        ),
+        ("--pose low.obj --pose wide.obj --ground", "a model on its ground takes one pose, but there are 2"),
         (
             "--pose low.obj --pose wide.obj --feet lock",
-            "--ground and --feet lock take one pose, but there are 2",
+            "a model with locked feet takes one pose, but there are 2",
         ),
     ] {
         sandbox.run(&format!("{DEFORM} {args} -o out.glb")).code(1).stderr(contains(message));
@@ -392,5 +389,5 @@ fn ground_and_feet_are_options_of_one_pose() {
     sandbox
         .run("deform out.obj --cage cage.obj --weights v.npz --pose low.obj --feet lock -o held.obj")
         .code(1)
-        .stderr(contains("out.obj: has no skeleton whose feet could be held"));
+        .stderr(contains("out.obj: locked feet need a model with a skeleton"));
 }

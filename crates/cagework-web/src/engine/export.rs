@@ -104,7 +104,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Answer<Vec<u8>> {
         let options = decode(options)?;
-        self.read(|state| Ok(state.bound_document().poses(id, &options)?))
+        self.export(|state| state.bound_document().poses(id, &options))
     }
 
     /// Exports the posed cage as OBJ.

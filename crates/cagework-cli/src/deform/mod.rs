@@ -1,0 +1,254 @@
+//! `cagework deform`: deforms a model by poses of its cage.
+
+mod report;
+
+use std::path::Path;
+use std::time::Instant;
+
+use cagework_core::deform::{deform_bound, outside_in_words};
+use cagework_core::enclosure::Enclosure;
+use cagework_core::words::counted;
+use cagework_core::{BindOptions, Cage};
+use cagework_io::{Clip, Model, SavedWeights, Timeline, shown};
+use cagework_job::{BoundPoints, Job, JobOptions, NamedPose, PoseTimes, Poses};
+use glam::Vec3;
+
+use crate::args::{CageSource, ControlArgs, DeformArgs, ModelOutput, SmoothArgs};
+use crate::bind::bind_job;
+use crate::controls::{rest_of, with_inner};
+use crate::error::CliError;
+use crate::field::{LatticeSummary, write_lattice};
+use crate::files::{check_outputs, json, print, write};
+use crate::load::{LoadedCage, load_any, load_cage, load_weights};
+use report::{DeformSummary, Subject, text};
+
+/// Largest distance of a vertex from its position by the weights, at rest, as a fraction of the cage's diagonal. Weights
+/// of this mesh and this cage are off by rounding only, except those of the classic method, which restores no rows.
+const MAX_MISFIT: f64 = 1e-3;
+
+/// Runs `cagework deform`.
+///
+/// # Errors
+/// If a file cannot be read or written, files do not match, or a bind fails.
+pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
+    let mut inputs = vec![args.mesh.as_path()];
+    inputs.extend(args.weights.as_deref());
+    inputs.extend(args.pose.iter().chain(&args.pose_controls).map(AsRef::<Path>::as_ref));
+    if let CageSource::File(path) = &args.cage {
+        inputs.push(path);
+    }
+    let outputs = args.output.iter().map(|output| output.path.as_path()).chain(args.lattice.as_deref());
+    check_outputs(&outputs.collect::<Vec<_>>(), &inputs)?;
+    check_names(args)?;
+    let model = load_any(&args.mesh, args.read.axis(), args.read.memory)?;
+    let lattice = args.lattice.as_deref().map(|path| lattice(args, path, &model)).transpose()?;
+    if let Some(output) = &args.output {
+        let summary = deform(args, &model, output, lattice)?;
+        return print(&if as_json { json(&summary) } else { text(&summary) });
+    }
+    lattice.map_or(Ok(()), |lattice| print(&if as_json { json(&lattice) } else { lattice.text() }))
+}
+
+/// Writes the lattice of `--lattice`.
+fn lattice(args: &DeformArgs, path: &Path, model: &Model) -> Result<LatticeSummary, CliError> {
+    match args.rig.job_options(false).given_for_meshes(args.output.is_some()) {
+        Some(option) => Err(CliError::Mismatch {
+            message: format!(
+                "--{option}: this option changes a model, but a lattice stores how the space inside the cage moves"
+            ),
+            hint: "leave the option out, or write the model and the lattice in two runs",
+        }),
+        None => write_lattice(args, path, model),
+    }
+}
+
+/// Deforms the model by all poses, and writes it.
+fn deform(
+    args: &DeformArgs,
+    model: &Model,
+    output: &ModelOutput,
+    lattice: Option<LatticeSummary>,
+) -> Result<DeformSummary, CliError> {
+    let (memory, of_output) = (args.read.memory, |e| CliError::job(&output.path, e));
+    let job = Job::new(model, output.format, &job_options(args, model)?);
+    let job = job.map_err(|e| CliError::job(&args.mesh, e))?;
+    check_inputs(args, job.follows_space())?;
+    let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
+    let cage = load_cage(&args.cage, model, memory, &controls)?;
+    let saved = args.weights.as_deref().map(|path| load_weights(path, model, &cage.cage, memory));
+    let saved = saved.transpose()?;
+    let inner = saved.as_ref().map_or(&[][..], |saved| &saved.inner_controls);
+    let (names, poses) = load_poses(args, &cage, inner)?;
+    job.check(&poses).map_err(of_output)?;
+
+    let (mut notices, mut subject) = (model.notices.clone(), subject(args, model, &cage, saved.as_ref()));
+    let bound = match saved {
+        Some(saved) => {
+            job.require_room(&poses, saved.weights.bytes() as u64, memory.bytes()).map_err(of_output)?;
+            let outside = saved.outside.iter().filter(|o| (o.vertex as usize) < model.positions.len());
+            notices.extend(outside_in_words(outside, cage.cage.diagonal()));
+            notices.extend(misfit_in_words(&saved, model, &cage.cage));
+            let rest = rest_of(&cage.cage, &saved);
+            BoundPoints::of_saved(saved, rest)
+        }
+        None => {
+            let options = BindOptions { memory_limit: memory.bytes(), ..BindOptions::default() };
+            bind_job(&job, cage.controls(), &poses, &options, &args.mesh)?
+        }
+    };
+    let started = Instant::now();
+    let deformed = job.deform(&bound, &poses).map_err(of_output)?;
+    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+    let written = job.write(deformed).map_err(of_output)?;
+    write(&output.path, &written.bytes)?;
+    subject.set_poses(names, poses.timeline().map(Timeline::seconds));
+    subject.count(&written);
+    notices.extend(subject.outside_in_words());
+    notices.extend(written.notices);
+    let output = output.path.display().to_string();
+    Ok(DeformSummary { output, subject, rig: written.rig, deform_ms, lattice, notices })
+}
+
+/// Options of the job that the arguments describe.
+fn job_options(args: &DeformArgs, model: &Model) -> Result<JobOptions, CliError> {
+    let clip = args.dynamic.as_deref().map(|name| Clip::named(&model.clips(), name)).transpose();
+    let clip = clip.map_err(|e| CliError::file(&args.mesh, e))?;
+    let mut options = JobOptions { clip, cells: Some(args.lattice_cells), ..args.rig.job_options(false) };
+    options.reshape.expressions = args.expression;
+    Ok(options)
+}
+
+/// Checks that the arguments fit the kind of model. `follows_space`: whether it is deformed without weights.
+fn check_inputs(args: &DeformArgs, follows_space: bool) -> Result<(), CliError> {
+    let (message, hint) = match &args.weights {
+        Some(_) if follows_space => {
+            ("the file has no faces, so it is deformed without weights", "leave out --weights")
+        }
+        None if !follows_space => {
+            ("the mesh can only be deformed with its weights", "give --weights, which `cagework bind` writes")
+        }
+        _ if follows_space && !args.name.is_empty() => {
+            ("--name needs a mesh, but the model has no faces", "leave it out")
+        }
+        _ if !follows_space && args.smooth > 0 && args.lattice.is_none() => (
+            "--smooth applies to --dynamic, --lattice, splats and points only: weights contain their steps",
+            "leave out --smooth",
+        ),
+        _ => return Ok(()),
+    };
+    Err(CliError::Mismatch { message: message.into(), hint })
+}
+
+/// Reads all poses and their names. `inner`: rest positions of the bound controls inside the cage.
+fn load_poses(
+    args: &DeformArgs,
+    cage: &LoadedCage,
+    inner: &[Vec3],
+) -> Result<(Vec<String>, Poses), CliError> {
+    let (mut names, mut positions, mut keys) = (Vec::new(), Vec::new(), Vec::new());
+    for (k, path) in args.pose.iter().enumerate() {
+        let name = args.name.get(k).cloned().unwrap_or_else(|| pose_name(path));
+        for state in cage.load_states(path)? {
+            names.push(format!("{name} {}", state.name).trim_end().to_owned());
+            keys.extend(state.seconds);
+            positions.push(state.positions);
+        }
+    }
+    // Key times of several files are unrelated.
+    if args.pose.len() > 1 {
+        keys.clear();
+    }
+    let axes = (args.read.axis(), cage.origin());
+    let mut positions = with_inner(positions, &args.pose_controls, inner, axes, args.read.memory)?;
+    let times = PoseTimes { times: args.times.clone(), keys, interpolation: args.interpolation };
+    let poses = if positions.len() == 1 && !args.expression {
+        Poses::shape(positions.remove(0), &times, false)
+    } else {
+        let named = names.iter().cloned().zip(positions);
+        let named = named.map(|(name, positions)| NamedPose { name, positions });
+        Poses::targets(named.collect(), &times, args.expression)
+    };
+    Ok((names, poses.map_err(|e| CliError::job(&args.pose[0], e))?))
+}
+
+/// Describes what is deformed, without the counts that are known after writing.
+fn subject(args: &DeformArgs, model: &Model, cage: &LoadedCage, saved: Option<&SavedWeights>) -> Subject {
+    let vertices = model.positions.len();
+    if let Some(saved) = saved {
+        let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < vertices);
+        return Subject::Mesh {
+            vertices,
+            cage_vertices: cage.cage.n_vertices(),
+            inner_controls: saved.inner_controls.len(),
+            outside_vertices: outside().count(),
+            staying_vertices: outside().filter(|o| o.share == 0.0).count(),
+            poses: Vec::new(),
+            expressions: args.expression,
+            animation_seconds: None,
+        };
+    }
+    if let Some(clip) = &args.dynamic {
+        let clips = model.clips();
+        let seconds = Clip::named(&clips, clip).map_or(0.0, |number| clips[number].seconds);
+        return Subject::Clip { clip: clip.clone(), frames: 0, seconds, vertices };
+    }
+    Subject::Capture {
+        points: vertices,
+        is_splats: model.splats().is_some(),
+        outside_points: Enclosure::new(cage.controls().surface(), &model.positions).outside().len(),
+        inexact_splats: 0,
+    }
+}
+
+/// Checks that `--name` is given once per `--pose` or not at all, with different names.
+fn check_names(args: &DeformArgs) -> Result<(), CliError> {
+    let (names, n_poses) = (&args.name, args.pose.len());
+    if !names.is_empty() && names.len() != n_poses {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "--name: {} for {}",
+                counted(names.len(), "name", "names"),
+                counted(n_poses, "file of poses", "files of poses")
+            ),
+            hint: "give one --name per --pose, in the same order",
+        });
+    }
+    match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
+        None => Ok(()),
+        Some((_, name)) => Err(CliError::Mismatch {
+            message: format!("--name: '{}' is given twice", shown(name)),
+            hint: "give each pose a name of its own",
+        }),
+    }
+}
+
+/// Says by how much the weights miss the mesh at rest; `None` within rounding.
+fn misfit_in_words(saved: &SavedWeights, model: &Model, cage: &Cage) -> Option<String> {
+    let misfit = misfit(saved, model, cage) / f64::from(cage.diagonal());
+    (misfit > MAX_MISFIT).then(|| {
+        format!(
+            "at rest the weights miss the mesh by up to {:.2} % of the cage's size: they are those of another mesh or \
+             cage, or of the classic method",
+            100.0 * misfit
+        )
+    })
+}
+
+/// Finds the largest distance between a vertex inside the cage and its position by the weights, at rest, object units.
+fn misfit(saved: &SavedWeights, model: &Model, cage: &Cage) -> f64 {
+    let mut by_weights = deform_bound(&saved.weights, &saved.frames, &rest_of(cage, saved));
+    for outside in &saved.outside {
+        if let (Some(at), Some(p)) =
+            (by_weights.get_mut(outside.vertex as usize), model.positions.get(outside.vertex as usize))
+        {
+            *at = *p;
+        }
+    }
+    let distance = |(at, p): (&Vec3, &Vec3)| at.as_dvec3().distance(p.as_dvec3());
+    by_weights.iter().zip(&model.positions).map(distance).fold(0.0, f64::max)
+}
+
+/// Returns the name of a pose: its file name without folder and extension.
+pub(crate) fn pose_name(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
+}

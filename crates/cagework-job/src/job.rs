@@ -1,0 +1,408 @@
+//! A job: what one model needs to be deformed and written.
+
+use std::borrow::Borrow;
+
+use cagework_core::bind::{BindError, weights_bytes};
+use cagework_core::field::{CELLS, CLIP_CELLS, Field, Lattice, bend_vertices};
+use cagework_core::words::counted;
+use cagework_core::{BindOptions, Controls};
+use cagework_io::{
+    Feet, MemoryError, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, Timeline, WriteError,
+};
+use glam::{DVec3, Vec3};
+
+use crate::error::JobError;
+use crate::follow::{Follow, JobPoints};
+use crate::options::{JobOptions, ResolvedOptions};
+use crate::poses::{NamedPose, Poses};
+
+/// How a model follows the cage, and what of its file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A mesh: its vertices follow.
+    Mesh,
+    /// A glTF that keeps its rig: vertices, joints, morph targets and clips follow.
+    Rig,
+    /// A glTF of clips without a mesh: its joints follow the skeleton of a body.
+    Clips,
+    /// Splats or points: they follow the deformation of space.
+    Capture,
+    /// A mesh whose clip with this index moves it before space is deformed.
+    Frames(usize),
+}
+
+/// The deformation of one model, and the format in which it is written. The model can be owned, borrowed or shared.
+#[derive(Clone, Debug)]
+pub struct Job<M> {
+    model: M,
+    format: ModelFormat,
+    kind: Kind,
+    options: ResolvedOptions,
+    cells: u32,
+    for_many: bool,
+}
+
+/// A deformed model that has not been written yet.
+#[derive(Clone, Debug)]
+pub struct Deformed {
+    shape: Shape,
+    /// When an animation shows the morph targets.
+    timeline: Option<Timeline>,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    /// Vertices, and morph targets beside them. `[n_vertices]` each, object units
+    Mesh { vertices: Vec<Vec3>, targets: Vec<(String, Vec<Vec3>)> },
+    /// Displacements of the vertices and of the points of the rig, and those of morph targets. `[n_points]` each, object
+    /// units
+    Rig { by: Vec<DVec3>, targets: Vec<(String, Vec<DVec3>)>, outside: Vec<u32> },
+    /// The deformation of space; `None` at rest.
+    Space(Option<Field>),
+}
+
+/// A written file, and what the user should know about it.
+#[derive(Clone, Debug, Default)]
+pub struct Written {
+    /// Contents of the file.
+    pub bytes: Vec<u8>,
+    /// Changes to skeleton, morph targets and clips; `None` if the file keeps none.
+    pub rig: Option<ReshapeReport>,
+    /// Number of splats for which the deformation differs from its first-order approximation by more than 10 % of half
+    /// the longest axis, at an end of this axis.
+    pub inexact_splats: usize,
+    /// Number of frames of a clip that became morph targets.
+    pub frames: usize,
+    /// What changed beside the shape, and what the format loses, one sentence each.
+    pub notices: Vec<String>,
+}
+
+/// Returns the memory in use while a bound model is written, bytes: `options.held`, the weights of `points` points, and
+/// `to_write`, the memory for writing.
+///
+/// # Errors
+/// [`BindError::WeightsMemory`] if the memory limit is exceeded.
+pub fn require_memory(
+    options: &BindOptions,
+    points: usize,
+    controls: Controls<'_>,
+    to_write: u64,
+) -> Result<u64, BindError> {
+    let (limit, columns) = (options.memory_limit, controls.n_controls());
+    let needed = options.held + weights_bytes(points, columns) + to_write;
+    if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
+}
+
+impl<M: Borrow<Model>> Job<M> {
+    /// Prepares the deformation of a model that is written as `format`.
+    ///
+    /// # Errors
+    /// If the model lacks what an option needs, or its rig cannot be read.
+    pub fn new(model: M, format: ModelFormat, options: &JobOptions) -> Result<Self, JobError> {
+        let mut job = Self::of_resolved(model, format, ReshapeOptions::default(), options.shape_only);
+        if let Some(clip) = options.clip {
+            job = job.of_clip(clip);
+        }
+        let (kind, keeps_rig) = (job.kind, job.keeps_rig());
+        let model = job.model.borrow();
+        if !options.for_many {
+            if kind == Kind::Capture
+                && let Some(option) = options.given_for_meshes(false)
+            {
+                return Err(JobError::NeedsMesh { option });
+            }
+            if options.reshape.feet == Feet::Lock && !keeps_rig {
+                return Err(JobError::NoFeet);
+            }
+            if matches!(kind, Kind::Frames(_)) && format != ModelFormat::Gltf {
+                return Err(JobError::ClipFormat { format });
+            }
+            let reads_vrm = model.vrm().is_some();
+            if options.reshape.expressions && !(reads_vrm && format == ModelFormat::Gltf) {
+                return Err(JobError::NoVrm { reads_vrm });
+            }
+        }
+        let resolved = match kind {
+            Kind::Capture => {
+                ResolvedOptions { reshape: options.reshape.clone(), ..ResolvedOptions::default() }
+            }
+            _ => options.resolve(model, keeps_rig)?,
+        };
+        let cells = options.cells.unwrap_or(job.cells);
+        Ok(Self { options: resolved, cells, for_many: options.for_many, ..job })
+    }
+
+    /// Prepares the deformation of a model whose parts are already selected. Options that have no effect on it are
+    /// ignored.
+    pub fn of_resolved(model: M, format: ModelFormat, options: ReshapeOptions, shape_only: bool) -> Self {
+        let own = model.borrow();
+        let kind = if own.positions.is_empty() {
+            Kind::Clips
+        } else if own.n_faces() == 0 {
+            Kind::Capture
+        } else if format == ModelFormat::Gltf && own.is_rigged() && !shape_only {
+            Kind::Rig
+        } else {
+            Kind::Mesh
+        };
+        let options = ResolvedOptions { reshape: options, ..ResolvedOptions::default() };
+        Self { model, format, kind, options, cells: CELLS, for_many: true }
+    }
+
+    /// Deforms the frames of a clip, which become morph targets, instead of the model with its rig. Captures have no
+    /// clips. `clip`: index of the clip.
+    #[must_use]
+    pub fn of_clip(self, clip: usize) -> Self {
+        let kind = match self.kind {
+            Kind::Mesh | Kind::Rig => Kind::Frames(clip),
+            Kind::Clips | Kind::Capture | Kind::Frames(_) => self.kind,
+        };
+        Self { kind, ..self }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        self.model.borrow()
+    }
+
+    /// Format of the file to write.
+    pub fn format(&self) -> ModelFormat {
+        self.format
+    }
+
+    /// Names of parts that the model lacks.
+    pub fn missing_parts(&self) -> &[String] {
+        &self.options.missing
+    }
+
+    /// Notices about names that several parts share, one sentence each. They are also in [`Written::notices`].
+    pub fn part_notices(&self) -> &[String] {
+        &self.options.notices
+    }
+
+    /// Whether the job deforms space instead of bound points, for splats, points and the frames of a clip.
+    pub fn follows_space(&self) -> bool {
+        matches!(self.kind, Kind::Capture | Kind::Frames(_))
+    }
+
+    /// Whether the file keeps skeleton, morph targets and clips.
+    pub fn keeps_rig(&self) -> bool {
+        matches!(self.kind, Kind::Rig | Kind::Clips)
+    }
+
+    /// Lists the model's vertices, and the points of its rig if the file keeps it. Also returns the number of points of
+    /// the rig. Object units
+    ///
+    /// # Errors
+    /// If the rig cannot be read.
+    pub fn all_points(&self) -> Result<(Vec<Vec3>, usize), JobError> {
+        let model = self.model();
+        let extra = if self.keeps_rig() { model.extra_points()? } else { Vec::new() };
+        let n_extra = extra.len();
+        Ok(([model.positions.as_slice(), &extra].concat(), n_extra))
+    }
+
+    /// Lists the points to bind to `controls`, which then take `poses`; `None` if there are none. `options`: options of
+    /// the bind, where `held` is the memory in use beside the model.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`]; if the rig cannot be read; if the weights, and writing the file, exceed the memory
+    /// limit.
+    pub fn points<'a>(
+        &self,
+        controls: impl Into<Controls<'a>>,
+        poses: &Poses,
+        options: &BindOptions,
+    ) -> Result<Option<JobPoints>, JobError> {
+        self.check(poses)?;
+        let controls = controls.into();
+        let options = BindOptions { held: options.held + self.model().bytes(), ..*options };
+        let to_write = self.bytes_to_write(poses);
+        let cells = match self.kind {
+            Kind::Clips => return Ok(None),
+            Kind::Mesh | Kind::Rig => {
+                let (positions, extra_points) = self.all_points()?;
+                require_memory(&options, positions.len(), controls, to_write)?;
+                let options = BindOptions { extra_points, ..options };
+                return Ok(Some(JobPoints { positions, options, lattice: None }));
+            }
+            Kind::Capture => self.cells,
+            Kind::Frames(_) => CLIP_CELLS,
+        };
+        let options = BindOptions { held: options.held + to_write, ..options };
+        let (lattice, options) = Lattice::within(controls.surface(), cells, &options)?;
+        Ok(Some(JobPoints { positions: lattice.points(), options, lattice: Some(lattice) }))
+    }
+
+    /// Checks that a model with weights of `weights_bytes` bytes can be written within a memory limit, bytes.
+    ///
+    /// # Errors
+    /// [`JobError::Memory`] if it cannot.
+    pub fn require_room(&self, poses: &Poses, weights_bytes: u64, limit: u64) -> Result<(), JobError> {
+        MemoryError::check(self.model().bytes() + weights_bytes + self.bytes_to_write(poses), limit)
+            .map_err(|source| JobError::Memory { targets: poses.n_targets(), source })
+    }
+
+    fn bytes_to_write(&self, poses: &Poses) -> u64 {
+        self.model().bytes_to_write(self.format) + self.model().bytes_of_poses(poses.n_targets())
+    }
+
+    /// Checks that the model can take these poses in its format.
+    ///
+    /// # Errors
+    /// If it cannot: several poses need a format with morph targets, and a model that can have them.
+    pub fn check(&self, poses: &Poses) -> Result<(), JobError> {
+        let Poses::Targets { all, .. } = poses else { return Ok(()) };
+        let ReshapeOptions { ground, feet, skeleton, .. } = &self.options.reshape;
+        let one = |what| poses.require_shape(what).map(drop);
+        match self.kind {
+            _ if all.is_empty() => Err(JobError::NoPoses),
+            Kind::Capture => one("a capture of splats or points"),
+            Kind::Clips => one("a file of clips"),
+            Kind::Frames(_) => one("a clip that the cage bends"),
+            Kind::Mesh | Kind::Rig if !self.format.holds_poses() => {
+                Err(JobError::FormatPoses { format: self.format, n: all.len() })
+            }
+            Kind::Mesh | Kind::Rig if self.for_many => Ok(()),
+            Kind::Mesh | Kind::Rig if *ground => one("a model on its ground"),
+            Kind::Mesh | Kind::Rig if *feet == Feet::Lock => one("a model with locked feet"),
+            Kind::Mesh | Kind::Rig if skeleton.is_some() => one("a shared skeleton"),
+            Kind::Mesh | Kind::Rig => Ok(()),
+        }
+    }
+
+    /// Deforms the model by poses of the controls.
+    ///
+    /// # Errors
+    /// As [`Self::check`], and if a pose belongs to another cage.
+    pub fn deform<F: Follow>(&self, follow: &F, poses: &Poses) -> Result<Deformed, F::Error> {
+        self.check(poses)?;
+        let (model, options) = (self.model(), &self.options.reshape);
+        let shape = match (self.kind, poses) {
+            (Kind::Rig | Kind::Clips, Poses::Shape(pose)) => {
+                let by = follow.displacements(model, pose)?;
+                Shape::Rig { by, targets: Vec::new(), outside: follow.outside() }
+            }
+            (Kind::Rig | Kind::Clips, Poses::Targets { all, .. }) => {
+                let targets = named(all, |pose| follow.displacements(model, pose))?;
+                let by = vec![DVec3::ZERO; targets.first().map_or(0, |(_, by)| by.len())];
+                Shape::Rig { by, targets, outside: follow.outside() }
+            }
+            (Kind::Mesh, Poses::Shape(pose)) => {
+                let mut vertices = follow.vertices(model, pose, &options.parts)?;
+                model.lift(&mut vertices, options);
+                Shape::Mesh { vertices, targets: Vec::new() }
+            }
+            (Kind::Mesh, Poses::Targets { all, .. }) => {
+                let targets = named(all, |pose| follow.vertices(model, pose, &options.parts))?;
+                Shape::Mesh { vertices: model.positions.clone(), targets }
+            }
+            (Kind::Capture | Kind::Frames(_), Poses::Shape(pose)) => Shape::Space(follow.field(pose)?),
+            // `check` refuses them.
+            (Kind::Capture | Kind::Frames(_), Poses::Targets { .. }) => return Err(JobError::Unbound.into()),
+        };
+        let timeline = poses.timeline().cloned();
+        Ok(Deformed { shape, timeline })
+    }
+
+    /// Computes how the joints of the model move in a pose, for clothes and files of clips with the same joints.
+    ///
+    /// # Errors
+    /// [`JobError::NoSkeleton`] if the model has no rig, or if it cannot be read; those of `follow`.
+    pub fn skeleton<F: Follow>(&self, follow: &F, pose: &[Vec3]) -> Result<Skeleton, F::Error> {
+        if self.kind != Kind::Rig {
+            return Err(JobError::NoSkeleton.into());
+        }
+        let by = follow.displacements(self.model(), pose)?;
+        let skeleton = self.model().skeleton(&by, &follow.outside(), &self.options.reshape);
+        Ok(skeleton.map_err(|e| self.of_write(e))?)
+    }
+
+    /// Writes the deformed model.
+    ///
+    /// # Errors
+    /// If the weights lack points of the rig, or the file cannot be written in this format.
+    pub fn write(&self, deformed: Deformed) -> Result<Written, JobError> {
+        let (model, format) = (self.model(), self.format);
+        let mut written = Written { notices: self.options.notices.clone(), ..Written::default() };
+        let Deformed { shape, timeline } = deformed;
+        match shape {
+            Shape::Rig { by, targets, outside } => {
+                let options = ReshapeOptions { timeline, ..self.options.reshape.clone() };
+                let reshaped = model.write_reshaped(&by, &outside, &targets, &options);
+                let (bytes, report) = reshaped.map_err(|e| self.of_write(e))?;
+                written.bytes = bytes;
+                written.notices.extend(report.notices());
+                written.rig = Some(report);
+            }
+            Shape::Mesh { vertices, targets } if targets.is_empty() => {
+                written.bytes = model.write(format, &vertices)?;
+            }
+            Shape::Mesh { vertices, targets } => {
+                written.bytes = match &timeline {
+                    None => model.write_glb_poses(&vertices, &targets)?,
+                    Some(timeline) => model.write_glb_poses_at(&vertices, &targets, timeline)?,
+                };
+            }
+            Shape::Space(field) => {
+                if let Kind::Frames(clip) = self.kind {
+                    return self.write_frames(clip, field.as_ref(), written);
+                }
+                written.bytes = match &field {
+                    Some(field) => model.write_in_field(format, field)?,
+                    None => model.write(format, &model.positions)?,
+                };
+                let splats = model.splats().zip(field.as_ref());
+                written.inexact_splats = splats.map_or(0, |(splats, field)| splats.n_inexact(field));
+                if written.inexact_splats > 0 {
+                    written.notices.push(format!(
+                        "{} by more than 10 % of the longest axis, which an ellipsoid cannot show.",
+                        counted(written.inexact_splats, "splat bends", "splats bend")
+                    ));
+                }
+            }
+        }
+        written.notices.extend(model.lost_in(format));
+        written.notices.extend(model.copies_in(format, &written.bytes));
+        Ok(written)
+    }
+
+    /// Writes the frames of a clip as morph targets, each deformed with the space around it.
+    fn write_frames(
+        &self,
+        clip: usize,
+        field: Option<&Field>,
+        written: Written,
+    ) -> Result<Written, JobError> {
+        let model = self.model();
+        let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
+        if let Some(field) = field {
+            frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(field, frame));
+        }
+        let n = frames.len();
+        let became = if n == 1 { "frame became a morph target" } else { "frames became morph targets" };
+        let mut notices = written.notices;
+        notices.push(format!("{n} {became}; the skeleton is left out"));
+        let bytes = model.write_baked(clip, &rest, frames)?;
+        Ok(Written { bytes, frames: n, notices, ..Written::default() })
+    }
+
+    /// Names what is missing if the weights do not include the points of the rig.
+    fn of_write(&self, error: WriteError) -> JobError {
+        let n = self.model().positions.len();
+        match error {
+            WriteError::Count { given, expected } if self.kind == Kind::Rig => {
+                JobError::RigPoints { given: given.saturating_sub(n), expected: expected - n }
+            }
+            error => JobError::Write(error),
+        }
+    }
+}
+
+/// Applies a function to each pose, and keeps the names.
+fn named<T, E>(
+    poses: &[NamedPose],
+    mut deform: impl FnMut(&[Vec3]) -> Result<T, E>,
+) -> Result<Vec<(String, T)>, E> {
+    poses.iter().map(|pose| Ok((pose.name.clone(), deform(&pose.positions)?))).collect()
+}

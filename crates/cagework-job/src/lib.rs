@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+
+mod error;
+mod follow;
+mod job;
+mod options;
+mod poses;
+
+pub use error::JobError;
+pub use follow::{BoundPoints, Follow, JobPoints};
+pub use job::{Deformed, Job, Written, require_memory};
+pub use options::JobOptions;
+pub use poses::{NamedPose, PoseTimes, Poses};
