@@ -10,6 +10,7 @@ mod controls;
 mod deform;
 mod demo;
 mod documents;
+mod doors;
 mod field;
 mod fit;
 #[cfg(unix)]

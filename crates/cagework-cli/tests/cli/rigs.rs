@@ -31,7 +31,7 @@ pub(crate) fn bound() -> Sandbox {
     sandbox
 }
 
-const DEFORM: &str = "deform humanoid.glb --cage cage.obj --weights w.npz";
+pub(crate) const DEFORM: &str = "deform humanoid.glb --cage cage.obj --weights w.npz";
 
 #[test]
 fn rig_is_kept_and_an_unmoved_model_is_byte_identical() {

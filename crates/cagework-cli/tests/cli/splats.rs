@@ -18,7 +18,7 @@ pub(crate) fn capture() -> Vec<u8> {
     bytes
 }
 
-fn sandbox() -> Sandbox {
+pub(crate) fn sandbox() -> Sandbox {
     let sandbox = Sandbox::new();
     sandbox.write("a.splat", capture());
     sandbox.write("box.obj", box_obj(&CORNERS));
