@@ -48,7 +48,7 @@ pub use page_options::{NUMBERS, PageBindOptions, Settings, fields};
 pub use playback::{Playback, SharedClip};
 pub use posed::{Brush, Grab, PosedModels};
 pub use proportions::FoldSample;
-pub use settings::DocumentSettings;
+pub use settings::{DocumentSettings, PoseSettings};
 pub use surface::SurfacePoint;
 pub use view::{DocumentView, PoseView, SelectionView};
 pub use watch::CageWatch;

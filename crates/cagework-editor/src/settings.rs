@@ -9,6 +9,7 @@ use cagework_io::{Interpolation, MAX_SECONDS, SECONDS_PER_POSE, position_bytes, 
 use cagework_pose::humanoid::Bone;
 use cagework_pose::proportions::Proportions;
 use glam::Vec3;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -34,37 +35,55 @@ pub struct DocumentSettings {
     /// Factors of the proportions that the pose contains.
     #[serde(skip_serializing_if = "is_unscaled")]
     pub proportions: Proportions,
-    /// Factors of the proportions that each saved pose contains. If empty, 1.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_proportions: Vec<Proportions>,
     /// Humanoid bones, and the names of the joints that the user has given them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bones: Vec<(String, String)>,
     /// Pinned surface points, which stay in place when the user pulls others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
-    /// The pinned surface points of each saved pose; null if unknown.
+    /// Settings of the saved poses, in the order of the project's poses. Poses beyond the list have default settings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_pins: Vec<Option<Vec<SurfacePoint>>>,
-    /// Whether each saved pose was saved for the cage of the project. If empty, all poses with one position per control
-    /// were.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_fits: Vec<bool>,
-    /// Share of each saved pose in the current pose, 0 to 1.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_shares: Vec<f32>,
-    /// Time from the previous pose to each saved pose, seconds. If empty, one second each.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_leads: Vec<f32>,
-    /// Interpolation towards each saved pose; null uses that of `transition`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_interpolations: Vec<Option<Interpolation>>,
+    pub saved_poses: Vec<PoseSettings>,
     /// How the animation of the saved poses goes from one to the next, and how it ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<Transition>,
     /// Visibility, rigid parts and fixed areas of each model.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<MemberSettings>,
+}
+
+/// What a project stores of a saved pose, beside its name and positions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PoseSettings {
+    /// Factors of the proportions that the pose contains.
+    #[serde(skip_serializing_if = "is_unscaled")]
+    pub proportions: Proportions,
+    /// Pinned surface points; null if unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pins: Option<Vec<SurfacePoint>>,
+    /// Whether the pose was saved for the cage of the project.
+    pub fits: bool,
+    /// Share of the pose in the current pose, 0 to 1.
+    pub share: f32,
+    /// Time from the previous pose to this one, seconds.
+    pub lead: f32,
+    /// Interpolation towards the pose; null uses that of [`DocumentSettings::transition`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpolation: Option<Interpolation>,
+}
+
+impl Default for PoseSettings {
+    fn default() -> Self {
+        Self {
+            proportions: Proportions::default(),
+            pins: None,
+            fits: true,
+            share: 0.0,
+            lead: SECONDS_PER_POSE,
+            interpolation: None,
+        }
+    }
 }
 
 impl DocumentSettings {
@@ -74,44 +93,34 @@ impl DocumentSettings {
         let Document { cage, poses, shares, transition, pins, sample, has_sample_cage, models, .. } =
             document;
         let in_file = models.up().turned_back(&document.pose);
-        let pose = document.is_posed().then(|| URL_SAFE_NO_PAD.encode(position_bytes(&in_file)));
-        let has_pins = poses.iter().any(|pose| pose.pins.is_some());
-        let pins_of = |pose: &NamedPose| pose.pins.as_ref().map(|pins| pins.to_vec());
+        let pose_is_stored = document.is_posed();
+        let pose = pose_is_stored.then(|| URL_SAFE_NO_PAD.encode(position_bytes(&in_file)));
         let n_controls = cage.mesh.positions.len();
-        let has_misfit = poses.iter().any(|pose| pose.positions.len() == n_controls && !document.fits(pose));
-        let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
-        let has_own = poses.iter().any(|pose| pose.interpolation.is_some());
-        let is_scaled = poses.iter().any(|pose| !is_unscaled(&pose.proportions));
-        let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
+        let of_pose = |(k, pose): (usize, &NamedPose)| PoseSettings {
+            proportions: pose.proportions,
+            pins: pose.pins.as_ref().map(|pins| pins.to_vec()),
+            // Poses with another number of positions never fit.
+            fits: pose.positions.len() != n_controls || document.fits(pose),
+            share: shares.get(k).copied().filter(|_| pose_is_stored).unwrap_or_default(),
+            lead: pose.lead,
+            interpolation: pose.interpolation,
+        };
+        let mut saved_poses: Vec<_> = poses.iter().enumerate().map(of_pose).collect();
+        if saved_poses.iter().all(|pose| *pose == PoseSettings::default()) {
+            saved_poses.clear();
+        }
         Self {
             sample: sample.as_deref().filter(|_| *has_sample_cage).map(str::to_owned),
             controls: (cage.controls != CageControls::default()).then(|| cage.controls.clone()),
             pose,
             proportions: document.proportions,
-            pose_proportions: if is_scaled {
-                poses.iter().map(|pose| pose.proportions).collect()
-            } else {
-                Vec::new()
-            },
             bones: models
                 .given_bones()
                 .iter()
                 .map(|(bone, joint)| (bone.to_string(), joint.clone()))
                 .collect(),
             pins: pins.to_vec(),
-            pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
-            pose_fits: if has_misfit {
-                poses.iter().map(|pose| document.fits(pose)).collect()
-            } else {
-                Vec::new()
-            },
-            pose_shares: if is_blended { shares.to_vec() } else { Vec::new() },
-            pose_leads: if is_timed { poses.iter().map(|pose| pose.lead).collect() } else { Vec::new() },
-            pose_interpolations: if has_own {
-                poses.iter().map(|pose| pose.interpolation).collect()
-            } else {
-                Vec::new()
-            },
+            saved_poses,
             transition: (*transition != Transition::default()).then_some(*transition),
             models: models.settings(),
         }
@@ -120,13 +129,24 @@ impl DocumentSettings {
     /// Reads the settings of a project; skips fields that cannot be read.
     #[must_use]
     pub fn read(text: &str) -> Self {
-        let mut given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
-        given.retain(|name, value| serde_json::from_value::<Self>(json!({ name: value })).is_ok());
-        let mut settings: Self = serde_json::from_value(given.into()).unwrap_or_default();
-        settings.pose_shares.iter_mut().for_each(|share| *share = share.clamp(0.0, 1.0));
-        settings.pose_leads.iter_mut().for_each(|lead| *lead = lead.clamp(0.0, MAX_SECONDS));
+        let mut given: Value = serde_json::from_str(text).unwrap_or_default();
+        if let Some(Value::Array(poses)) = given.get_mut("saved_poses") {
+            for pose in poses {
+                let mut own: PoseSettings = readable(pose.take());
+                own.share = own.share.clamp(0.0, 1.0);
+                own.lead = own.lead.clamp(0.0, MAX_SECONDS);
+                *pose = json!(own);
+            }
+        }
+        let mut settings: Self = readable(given);
         settings.transition = settings.transition.map(Transition::within_limits);
         settings
+    }
+
+    /// Share of each saved pose in the current pose, 0 to 1.
+    #[must_use]
+    pub fn shares(&self) -> Vec<f32> {
+        self.saved_poses.iter().map(|pose| pose.share).collect()
     }
 
     /// Adds these settings to `others`, a JSON object, and replaces fields of the same name. Returns JSON text.
@@ -171,18 +191,18 @@ impl DocumentSettings {
         cage: Option<&RestCage>,
     ) -> Vec<NamedPose> {
         let cage = cage.map(|cage| (cage.mesh.positions.len(), cage_id(&cage.mesh)));
-        let cage_of = |k: usize, n: usize| {
-            let fits = |own: &(usize, u32)| own.0 == n && self.pose_fits.get(k).copied().unwrap_or(true);
-            cage.filter(fits).map(|(_, id)| id)
-        };
-        let named = |(k, (name, positions)): (usize, (String, Vec<Vec3>))| NamedPose {
-            name: name.into(),
-            cage: cage_of(k, positions.len()),
-            positions: Arc::from(positions),
-            pins: self.pose_pins.get(k).cloned().flatten().map(Into::into),
-            lead: self.pose_leads.get(k).copied().unwrap_or(SECONDS_PER_POSE),
-            interpolation: self.pose_interpolations.get(k).copied().flatten(),
-            proportions: self.pose_proportions.get(k).copied().unwrap_or_default(),
+        let named = |(k, (name, positions)): (usize, (String, Vec<Vec3>))| {
+            let PoseSettings { proportions, pins, fits, lead, interpolation, .. } =
+                self.saved_poses.get(k).cloned().unwrap_or_default();
+            NamedPose {
+                name: name.into(),
+                cage: cage.filter(|(n, _)| fits && *n == positions.len()).map(|(_, id)| id),
+                positions: Arc::from(positions),
+                pins: pins.map(Into::into),
+                lead,
+                interpolation,
+                proportions,
+            }
         };
         poses.into_iter().enumerate().map(named).collect()
     }
@@ -202,6 +222,13 @@ impl DocumentSettings {
     }
 }
 
+/// Reads a JSON object, and skips members that cannot be read.
+fn readable<T: Default + DeserializeOwned>(value: Value) -> T {
+    let Value::Object(mut members) = value else { return T::default() };
+    members.retain(|name, value| serde_json::from_value::<T>(json!({ name: value })).is_ok());
+    serde_json::from_value(members.into()).unwrap_or_default()
+}
+
 fn is_unscaled(proportions: &Proportions) -> bool {
     *proportions == Proportions::default()
 }
@@ -213,10 +240,17 @@ mod tests {
     #[test]
     fn unreadable_fields_are_skipped() {
         let read = |given: Value| DocumentSettings::read(&given.to_string());
-        assert_eq!(read(json!({ "pose_shares": [0.25, -3, 1e300] })).pose_shares, [0.25, 0.0, 1.0]);
+        let shares = [0.25, -3.0, 1e300].map(|share| json!({ "share": share }));
+        assert_eq!(read(json!({ "saved_poses": shares })).shares(), [0.25, 0.0, 1.0]);
+        let damaged = json!([{ "share": "half", "lead": 2.5 }, 7]);
+        let read_poses = read(json!({ "saved_poses": damaged, "sample": 7, "pins": {}, "pose": [] }));
+        let known = PoseSettings { lead: 2.5, ..PoseSettings::default() };
         assert_eq!(
-            read(json!({ "pose_shares": ["half"], "sample": 7, "pins": {}, "pose": [] })),
-            DocumentSettings::default()
+            read_poses,
+            DocumentSettings {
+                saved_poses: vec![known, PoseSettings::default()],
+                ..DocumentSettings::default()
+            }
         );
         for text in ["not json", "[1]", ""] {
             assert_eq!(DocumentSettings::read(text), DocumentSettings::default());
@@ -243,8 +277,6 @@ mod tests {
             let read = DocumentSettings::read(&text).poses(all.iter().map(|_| empty()), None);
             assert_eq!(read.into_iter().map(|pose| pose.pins).collect::<Vec<_>>(), all);
         }
-        let old = DocumentSettings::read(&json!({ "pose_pins": [[], [pin]] }).to_string());
-        assert_eq!(old.pose_pins, [Some(vec![]), Some(vec![pin])]);
     }
 
     #[test]

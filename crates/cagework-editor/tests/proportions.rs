@@ -9,6 +9,7 @@ use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Binding, bind, subdivided_box};
 use cagework_editor::{
     BoundDocument, BoundModels, Command, Contents, DocumentSettings, Editor, FoldSample, KnownGround,
+    PoseSettings,
 };
 use cagework_io::{Model, read_project, write_mesh_glb};
 use cagework_pose::proportions::Proportion;
@@ -172,8 +173,11 @@ fn a_project_keeps_factors_rings_and_given_bones() {
     again.apply(Command::SetPreset { name: None }).unwrap();
     assert_eq!(again.document().pose[4..], again.document().cage.mesh.positions[4..]);
 
-    let old = DocumentSettings::read(r#"{"proportions": {"leg": 7}, "pose_proportions": [{"tail": 1}]}"#);
-    assert_eq!(old, DocumentSettings::default());
+    let old = DocumentSettings::read(
+        r#"{"proportions": {"leg": 7}, "saved_poses": [{"proportions": {"tail": 1}}]}"#,
+    );
+    assert_eq!(old.proportions, DocumentSettings::default().proportions);
+    assert_eq!(old.saved_poses, [PoseSettings::default()]);
 }
 
 #[test]

@@ -264,7 +264,7 @@ fn saved_and_opened(saved: &Editor) -> Document {
     let contents = Contents {
         poses: settings.poses(project.poses, cage.as_ref()),
         cage,
-        shares: settings.pose_shares.clone(),
+        shares: settings.shares(),
         transition: settings.transition.unwrap_or_default(),
         pins: settings.pins.clone(),
         bones: settings.given_bones(),

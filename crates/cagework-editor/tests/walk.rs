@@ -322,9 +322,7 @@ fn damaged_projects_open_as_valid_documents() {
     let bytes = editor.write_project("{}").expect("valid input");
     let project = || read_project("saved.glb", &bytes, 1 << 28).expect("valid input").expect("valid input");
     let settings: Value = serde_json::from_str(&project().settings).expect("valid input");
-    for field in
-        ["controls", "pose", "pins", "pose_pins", "pose_shares", "pose_leads", "transition", "models"]
-    {
+    for field in ["controls", "pose", "pins", "saved_poses", "transition", "models"] {
         assert!(settings.get(field).is_some(), "{field} is not damaged");
     }
     runner(300)
@@ -340,7 +338,7 @@ fn damaged_projects_open_as_valid_documents() {
             let contents = Contents {
                 poses: settings.poses(project.poses, cage.as_ref()),
                 cage,
-                shares: settings.pose_shares.clone(),
+                shares: settings.shares(),
                 transition: settings.transition.unwrap_or_default(),
                 pins: settings.pins.clone(),
                 bones: settings.given_bones(),

@@ -22,7 +22,7 @@ use crate::shown::shown;
 use crate::splats::SplatsToWrite;
 
 /// Format version of projects.
-const VERSION: u64 = 4;
+const VERSION: u64 = 5;
 
 /// Contents of a project.
 #[derive(Clone, Debug)]

@@ -50,7 +50,7 @@ impl OpenContents {
         let contents = Contents {
             poses: settings.poses(given, cage.as_ref()),
             cage,
-            shares: settings.pose_shares.clone(),
+            shares: settings.shares(),
             transition: settings.transition.unwrap_or_default(),
             pins: settings.pins.clone(),
             bones: settings.given_bones(),

@@ -298,6 +298,26 @@ impl GltfDocument {
         GltfParts { json, slots: slots.collect(), buffers, images, text, packed, is_decoded, bytes }
     }
 
+    /// Creates a document from JSON that an edit has changed, and its only buffer. `is_decoded`: as [`Self::is_decoded`].
+    ///
+    /// # Errors
+    /// If its nodes, vertices or joints cannot be read.
+    pub(crate) fn of_edited(json: Value, bin: Vec<u8>, is_decoded: bool) -> Result<Self, GltfError> {
+        let n_images = json["images"].as_array().map_or(0, Vec::len);
+        let mut document = Self::of_parts(GltfParts {
+            json,
+            slots: Vec::new(),
+            buffers: vec![Arc::new(bin)],
+            images: vec![None; n_images],
+            text: None,
+            packed: None,
+            is_decoded,
+            bytes: 0,
+        })?;
+        document.slots = geometry::read(&document, DVec3::ZERO, &mut Vec::new())?.slots;
+        Ok(document)
+    }
+
     /// Rebuilds a document from the result of [`Self::into_parts`].
     ///
     /// # Errors

@@ -171,15 +171,28 @@ impl<'a> Edit<'a> {
 
     /// Returns the GLB, or the original file if nothing has changed.
     pub(super) fn finish(self) -> Result<Vec<u8>, WriteError> {
-        let Self { document, mut json, mut bin, has_written, .. } = self;
-        if let Some(file) = document.as_read().filter(|_| !has_written && json == joined(document)) {
+        let (document, has_written) = (self.document, self.has_written);
+        if let Some(file) = document.as_read().filter(|_| !has_written && self.json == joined(document)) {
             return file;
         }
+        let (json, bin) = self.into_contents();
+        write(json, &bin, document.is_decoded)
+    }
+
+    /// Returns the edited document, for further edits.
+    ///
+    /// # Errors
+    /// If its vertices or joints cannot be read.
+    pub(super) fn into_document(self) -> Result<GltfDocument, WriteError> {
+        let is_decoded = self.document.is_decoded;
+        let (json, bin) = self.into_contents();
+        Ok(GltfDocument::of_edited(json, bin, is_decoded)?)
+    }
+
+    /// The document's JSON and its only buffer, with external images embedded.
+    fn into_contents(self) -> (Value, Vec<u8>) {
+        let Self { document, mut json, mut bin, .. } = self;
         embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
-        if document.is_decoded {
-            // Nothing refers to the compressed streams, so `Pack::finish` drops them.
-            return Pack::of_bytes(&json, &bin).finish(json);
-        }
         // If the buffer has not changed, keep its declared length: the chunk may be longer because of padding.
         let only = if let [only] = document.buffers.as_slice() { only.len() } else { 0 };
         if bin.is_empty() {
@@ -187,8 +200,24 @@ impl<'a> Edit<'a> {
         } else if bin.len() != only {
             json["buffers"] = json!([{ "byteLength": bin.len() }]);
         }
-        write_glb(&json, &bin)
+        (json, bin)
     }
+}
+
+impl GltfDocument {
+    /// Writes a document that was edited ([`Edit::into_document`]).
+    pub(super) fn write_edited(self) -> Result<Vec<u8>, WriteError> {
+        let bin = self.buffers.first().map_or(&[][..], |bin| bin.as_slice());
+        write(self.json, bin, self.is_decoded)
+    }
+}
+
+fn write(json: Value, bin: &[u8], is_decoded: bool) -> Result<Vec<u8>, WriteError> {
+    if is_decoded {
+        // Nothing refers to the compressed streams, so `Pack::finish` drops them.
+        return Pack::of_bytes(&json, bin).finish(json);
+    }
+    write_glb(&json, bin)
 }
 
 /// The document's JSON, as if all buffers were concatenated into one.

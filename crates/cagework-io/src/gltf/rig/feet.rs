@@ -13,18 +13,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ::gltf::json::scene::{Node, UnitQuaternion};
+use ::gltf::json::scene::UnitQuaternion;
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use serde_json::json;
 
-use super::clip::{Clip, clips, quaternion, vector};
+use super::clip::{Clip, clips, quaternion};
 use super::edit::Edit;
 use super::nodes::{holders, vrm_bones};
+use super::tree::{NodeTree, PosedNodes};
 use crate::error::WriteError;
+use crate::gltf::GltfDocument;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
-use crate::gltf::scene::{Worlds, local};
-use crate::gltf::{self, GltfDocument};
+use crate::gltf::scene::local;
 use crate::surface::rotation;
 
 /// Largest speed of a planted ankle, leg lengths per second. The swinging foot of a walk is about ten times as fast.
@@ -79,68 +80,31 @@ pub(super) struct Contacts {
 /// Node indices of thigh, shin and foot.
 type Leg = [usize; 3];
 
-/// Nodes of a document and its clips.
-struct NodeTree<'a> {
-    nodes: &'a [Node],
-    order: Vec<(u32, Option<u32>)>,
+/// Nodes of a document, their parents, and its clips.
+struct Skeleton {
+    tree: NodeTree,
     parents: Vec<Option<usize>>,
     clips: Vec<Clip>,
 }
 
-/// Local and world transforms of all nodes at one time.
-struct Pose {
-    nodes: Vec<Node>,
-    world: Vec<DMat4>,
-}
-
-impl<'a> NodeTree<'a> {
-    fn new(document: &'a GltfDocument) -> Result<Self, WriteError> {
-        let order = Worlds::new(&document.root)?.order;
-        let mut parents = vec![None; document.root.nodes.len()];
-        for &(node, parent) in &order {
-            parents[node as usize] = parent.map(|parent| parent as usize);
-        }
-        Ok(Self { nodes: &document.root.nodes, order, parents, clips: clips(document) })
+impl Skeleton {
+    fn new(document: &GltfDocument) -> Result<Self, WriteError> {
+        let tree = NodeTree::new(document)?;
+        Ok(Self { parents: tree.parents(), tree, clips: clips(document) })
     }
 
-    fn at(&self, clip: Option<&Clip>, seconds: f64) -> Pose {
-        let mut nodes = self.nodes.to_vec();
-        for (driven, value) in clip.into_iter().flat_map(|clip| clip.at(seconds as f32)) {
-            match driven {
-                ChannelTarget::Translation(n) if n < nodes.len() => {
-                    nodes[n].translation = Some(vector(&value).as_vec3().to_array());
-                }
-                ChannelTarget::Rotation(n) if n < nodes.len() => {
-                    nodes[n].rotation = Some(UnitQuaternion(quaternion(&value).as_quat().to_array()));
-                }
-                ChannelTarget::Scale(n) if n < nodes.len() => {
-                    nodes[n].scale = Some(vector(&value).as_vec3().to_array());
-                }
-                _ => {}
-            }
-        }
-        let mut world = vec![DMat4::IDENTITY; nodes.len()];
-        for &(node, parent) in &self.order {
-            let above = parent.map_or(DMat4::IDENTITY, |p| world[p as usize]);
-            world[node as usize] = above * local(&nodes[node as usize]);
-        }
-        Pose { nodes, world }
+    fn at(&self, clip: &Clip, seconds: f64) -> PosedNodes {
+        self.tree.posed(&clip.at(seconds as f32).collect::<Vec<_>>())
     }
 }
 
-impl Pose {
-    fn place(&self, node: usize) -> DVec3 {
-        self.world[node].w_axis.truncate()
-    }
-
-    fn length(&self, [thigh, shin, foot]: Leg) -> f64 {
-        self.place(thigh).distance(self.place(shin)) + self.place(shin).distance(self.place(foot))
-    }
+fn length(pose: &PosedNodes, [thigh, shin, foot]: Leg) -> f64 {
+    pose.position(thigh).distance(pose.position(shin)) + pose.position(shin).distance(pose.position(foot))
 }
 
 /// Finds the legs of a document: those that a VRM names, otherwise chains of two joints above a joint named like a
 /// foot, or like a hand if it is near the ground.
-fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg> {
+fn legs(document: &GltfDocument, skeleton: &Skeleton, up: DVec3) -> Vec<Leg> {
     let json = &document.json;
     let bones = vrm_bones(document);
     let bone = |name: &str| bones.iter().find(|(bone, _)| *bone == name).map(|(_, node)| *node);
@@ -157,7 +121,7 @@ fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg>
             && !["toe", "ik", "pole"].iter().any(|no| name.contains(no))
     };
     let above = |node: usize| skeleton.parents.get(node).copied().flatten();
-    let rest = skeleton.at(None, 0.0);
+    let rest = skeleton.tree.posed([]);
     let by_name = |names: &[&str]| -> Vec<Leg> {
         let chain = |&foot: &usize| {
             let shin = above(foot)?;
@@ -171,20 +135,21 @@ fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg>
     };
     let found = if of_vrm.is_empty() {
         let mut feet = by_name(&FEET);
-        let height = |leg: &Leg| rest.place(leg[2]).dot(up);
+        let height = |leg: &Leg| rest.position(leg[2]).dot(up);
         let low = feet.iter().map(height).fold(f64::INFINITY, f64::min);
-        let is_low = |leg: &Leg| height(leg) - low <= MAX_HAND_HEIGHT * rest.length(*leg);
+        let is_low = |leg: &Leg| height(leg) - low <= MAX_HAND_HEIGHT * length(&rest, *leg);
         feet.extend(by_name(&HANDS).into_iter().filter(is_low));
         feet
     } else {
         of_vrm
     };
     let is_direct = |leg: &Leg| {
-        leg.iter().all(|&node| node < skeleton.nodes.len() && skeleton.nodes[node].matrix.is_none())
+        leg.iter().all(|&node| skeleton.tree.nodes.get(node).is_some_and(|node| node.matrix.is_none()))
             && above(leg[2]) == Some(leg[1])
             && above(leg[1]) == Some(leg[0])
     };
-    let has_length = |leg: &Leg| leg.windows(2).all(|w| rest.place(w[0]).distance(rest.place(w[1])) > 0.0);
+    let has_length =
+        |leg: &Leg| leg.windows(2).all(|w| rest.position(w[0]).distance(rest.position(w[1])) > 0.0);
     // A joint belongs to at most one leg. If a shin has two feet, use the first one.
     let mut taken = BTreeSet::new();
     let mut is_apart = |leg: &Leg| leg.iter().all(|&node| taken.insert(node));
@@ -192,18 +157,16 @@ fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg>
     legs.filter(|leg| is_apart(leg)).take(MAX_LEGS).collect()
 }
 
-/// Locks planted feet in a reshaped GLB of `before`. `up`: up axis of the file.
+/// Locks planted feet in `after`, the reshaped document of `before`. `up`: up axis of the file.
 ///
 /// # Errors
-/// [`WriteError`] if the GLB cannot be read again.
+/// [`WriteError`] if the nodes of a document do not form a tree.
 pub(super) fn lock(
     before: &GltfDocument,
-    glb: Vec<u8>,
+    after: GltfDocument,
     up: DVec3,
-) -> Result<(Vec<u8>, Contacts), WriteError> {
-    let place = (Some(DVec3::ZERO), true);
-    let after = gltf::read("export.glb", &glb, &mut |_| None, u64::MAX, place)?.document;
-    let (old, new) = (NodeTree::new(before)?, NodeTree::new(&after)?);
+) -> Result<(GltfDocument, Contacts), WriteError> {
+    let (old, new) = (Skeleton::new(before)?, Skeleton::new(&after)?);
     let legs = legs(before, &old, up);
     let mut contacts = Contacts { legs: legs.len(), ..Contacts::default() };
     let mut edit = Edit::new(&after);
@@ -212,14 +175,14 @@ pub(super) fn lock(
             continue;
         }
         let times = if clip.is_stepped() { keys(clip) } else { times(clip) };
-        let rest = old.at(None, 0.0);
-        let lengths: Vec<f64> = legs.iter().map(|&leg| rest.length(leg)).collect();
+        let rest = old.tree.posed([]);
+        let lengths: Vec<f64> = legs.iter().map(|&leg| length(&rest, leg)).collect();
         // Keep only the ankles' paths. The poses of all samples can take gigabytes, so they are evaluated again below.
-        let paths = |of: &NodeTree<'_>, clip: &Clip| -> Vec<Vec<DVec3>> {
+        let paths = |of: &Skeleton, clip: &Clip| -> Vec<Vec<DVec3>> {
             let mut paths = vec![Vec::with_capacity(times.len()); legs.len()];
             for &t in &times {
-                let pose = of.at(Some(clip), t);
-                paths.iter_mut().zip(&legs).for_each(|(path, leg)| path.push(pose.place(leg[2])));
+                let pose = of.at(clip, t);
+                paths.iter_mut().zip(&legs).for_each(|(path, leg)| path.push(pose.position(leg[2])));
             }
             paths
         };
@@ -239,7 +202,7 @@ pub(super) fn lock(
             .collect();
         let mut held_paths = vec![Vec::with_capacity(times.len()); legs.len()];
         for (k, &t) in times.iter().enumerate() {
-            let pose = new.at(Some(new_clip), t);
+            let pose = new.at(new_clip, t);
             for ((leg, by), path) in legs.iter().zip(&by).zip(&mut held_paths) {
                 let (turned, place) = reach(&pose, &new.parents, *leg, by[k]);
                 path.push(place);
@@ -262,9 +225,9 @@ pub(super) fn lock(
     }
     contacts.slide = contacts.slide.map(|slide| slide / contacts.n.max(1) as f64);
     if contacts.n == 0 {
-        return Ok((glb, contacts));
+        return Ok((after, contacts));
     }
-    Ok((edit.finish()?, contacts))
+    Ok((edit.into_document()?, contacts))
 }
 
 /// Times of the keys of a clip, seconds, ascending, at most [`MAX_SAMPLES`].
@@ -390,9 +353,9 @@ fn spans(
 }
 
 /// Whether the last pose of the legs in a clip equals the first one, except for a translation along the ground.
-fn is_loop(skeleton: &NodeTree<'_>, clip: &Clip, legs: &[Leg], lengths: &[f64], up: DVec3) -> bool {
-    let [first, last] = [0.0, f64::from(clip.seconds)].map(|t| skeleton.at(Some(clip), t));
-    let by = |node: usize| last.place(node) - first.place(node);
+fn is_loop(skeleton: &Skeleton, clip: &Clip, legs: &[Leg], lengths: &[f64], up: DVec3) -> bool {
+    let [first, last] = [0.0, f64::from(clip.seconds)].map(|t| skeleton.at(clip, t));
+    let by = |node: usize| last.position(node) - first.position(node);
     let travel = legs.first().map_or(DVec3::ZERO, |leg| flat(by(leg[0]), up));
     let is_same =
         |(leg, &length): (&Leg, &f64)| leg.iter().all(|&node| by(node).distance(travel) <= MAX_SEAM * length);
@@ -481,12 +444,12 @@ fn turn_within(space: DMat4, turn: DQuat) -> DQuat {
 }
 
 /// Computes the local rotations of a leg whose ankle moves by `by`, and the ankle's position.
-fn reach(pose: &Pose, parents: &[Option<usize>], leg: Leg, by: DVec3) -> ([DQuat; 3], DVec3) {
+fn reach(pose: &PosedNodes, parents: &[Option<usize>], leg: Leg, by: DVec3) -> ([DQuat; 3], DVec3) {
     let own = leg.map(|node| {
         let r = pose.nodes[node].rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |r| r.0.map(f64::from));
         quaternion(&r)
     });
-    let [hip, knee, ankle] = leg.map(|node| pose.place(node));
+    let [hip, knee, ankle] = leg.map(|node| pose.position(node));
     let (thigh, shin) = ((knee - hip).length(), (ankle - knee).length());
     if by.length() <= 1e-9 * (thigh + shin) || thigh.min(shin) <= 0.0 {
         return (own, ankle);

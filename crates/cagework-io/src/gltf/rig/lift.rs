@@ -21,10 +21,10 @@ use super::play::Player;
 use super::tracks::{output, own_sampler, values};
 use super::{Rig, feet};
 use crate::error::WriteError;
+use crate::gltf::GltfDocument;
 use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
 use crate::gltf::scene::Worlds;
-use crate::gltf::{self, GltfDocument};
 
 /// Largest number of samples of all clips together.
 const MAX_SAMPLES: usize = 40_000;
@@ -53,18 +53,17 @@ enum Points {
     Joints(Vec<usize>),
 }
 
-/// In each clip of `glb`, the reshaped document of `rig`, moves the animated skeletons vertically by their top nodes
+/// In each clip of `after`, the reshaped document of `rig`, moves the animated skeletons vertically by their top nodes
 /// ([`tops`]), so that the lowest point of the clip has its original height.
 ///
 /// # Errors
-/// [`WriteError`] if the GLB cannot be read again.
+/// [`WriteError`] if the vertices or joints of the document cannot be read.
 pub(super) fn lift_clips(
     rig: &Rig<'_>,
-    glb: Vec<u8>,
+    after: GltfDocument,
     given: &LiftInput<'_>,
-) -> Result<(Vec<u8>, Vec<ClipGround>), WriteError> {
+) -> Result<(GltfDocument, Vec<ClipGround>), WriteError> {
     let before = rig.document;
-    let after = gltf::read("export.glb", &glb, &mut |_| None, u64::MAX, (Some(DVec3::ZERO), true))?.document;
     let players = [Player::new(before, before, rig.origin)?, Player::new(&after, before, rig.origin)?];
     let height = rig.origin.dot(given.up);
     let top_of = tops(rig, given.named);
@@ -112,9 +111,9 @@ pub(super) fn lift_clips(
         all.push(ClipGround { name, seconds, lows, lift: lift.unwrap_or(0.0) });
     }
     if all.iter().all(|clip| clip.lift == 0.0) {
-        return Ok((glb, all));
+        return Ok((after, all));
     }
-    Ok((edit.finish()?, all))
+    Ok((edit.into_document()?, all))
 }
 
 /// For each node, the node that moves it together with its skeleton: from the root down, the first one that follows the

@@ -27,6 +27,7 @@ mod rest;
 mod shape;
 mod skeleton;
 mod tracks;
+mod tree;
 mod vrm;
 
 use std::collections::{HashMap, HashSet};

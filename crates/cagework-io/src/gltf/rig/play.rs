@@ -2,15 +2,14 @@
 
 use std::collections::HashMap;
 
-use ::gltf::json::scene::{Node, UnitQuaternion};
 use cagework_core::skin::Skin;
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
-use super::clip::{Clip, clips, quaternion, vector};
+use super::clip::{Clip, clips};
 use super::skeleton::bare;
+use super::tree::NodeTree;
 use crate::gltf::channels::ChannelTarget;
 use crate::gltf::geometry::{attribute, vectors};
-use crate::gltf::scene::{Worlds, local};
 use crate::gltf::target_names::target_names;
 use crate::gltf::{GltfDocument, GltfError, Slot, skin};
 use crate::origin::relative;
@@ -22,11 +21,9 @@ pub struct Player {
     /// Vertices of the model with their joint weights and morph deltas.
     pub skin: Skin,
     clips: Vec<Clip>,
-    nodes: Vec<Node>,
+    tree: NodeTree,
     /// Names of the nodes without their namespaces. `[n_nodes]`
     node_names: Vec<Option<String>>,
-    /// Nodes, each with its parent; parents come first.
-    order: Vec<(u32, Option<u32>)>,
     /// Node and inverse bind matrix of each entry of the palette.
     pub(super) palette: Vec<(Option<u32>, DMat4)>,
     /// Default weights of all morph targets. `of_nodes` and `of_meshes` give the index of the first target of a node or
@@ -58,15 +55,13 @@ impl Player {
         like: &GltfDocument,
         origin: DVec3,
     ) -> Result<Self, GltfError> {
-        let worlds = Worlds::new(&document.root)?;
         let mut player = Self {
             skin: Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() },
             clips: clips(document),
-            nodes: document.root.nodes.clone(),
+            tree: NodeTree::new(document)?,
             node_names: (0..document.root.nodes.len())
                 .map(|node| Some(bare(document.json["nodes"][node]["name"].as_str()?).to_owned()))
                 .collect(),
-            order: worlds.order,
             palette: Vec::new(),
             defaults: Vec::new(),
             of_nodes: HashMap::new(),
@@ -204,42 +199,20 @@ impl Player {
 
     /// The pose with these values of animated properties.
     fn with(&self, values: impl Iterator<Item = (ChannelTarget, Vec<f64>)>, targets: &[f32]) -> RigPose {
-        let mut nodes = self.nodes.clone();
+        let values: Vec<_> = values.collect();
         let mut weights = if targets.is_empty() { self.defaults.clone() } else { targets.to_vec() };
         weights.resize(self.defaults.len(), 0.0);
-        let put = |weights: &mut [f32], first: usize, values: &[f64]| {
-            weights.iter_mut().skip(first).zip(values).for_each(|(w, &value)| *w = value as f32);
-        };
-        for (driven, value) in values {
-            let node = |number: usize| nodes.get(number).is_some();
-            match driven {
-                ChannelTarget::Translation(n) if node(n) => {
-                    nodes[n].translation = Some(vector(&value).as_vec3().to_array());
-                }
-                ChannelTarget::Rotation(n) if node(n) => {
-                    nodes[n].rotation = Some(UnitQuaternion(quaternion(&value).as_quat().to_array()));
-                }
-                ChannelTarget::Scale(n) if node(n) => {
-                    nodes[n].scale = Some(vector(&value).as_vec3().to_array());
-                }
-                ChannelTarget::Weights(n) => {
-                    if let Some(&first) = self.of_nodes.get(&n) {
-                        put(&mut weights, first, &value);
-                    }
-                }
-                ChannelTarget::MeshWeights(n) => {
-                    for &first in self.of_meshes.get(&n).into_iter().flatten() {
-                        put(&mut weights, first, &value);
-                    }
-                }
-                _ => {}
+        for (driven, value) in &values {
+            let firsts = match driven {
+                ChannelTarget::Weights(n) => self.of_nodes.get(n).map_or(&[][..], std::slice::from_ref),
+                ChannelTarget::MeshWeights(n) => self.of_meshes.get(n).map_or(&[][..], Vec::as_slice),
+                _ => &[],
+            };
+            for &first in firsts {
+                weights.iter_mut().skip(first).zip(value).for_each(|(w, &value)| *w = value as f32);
             }
         }
-        let mut world = vec![DMat4::IDENTITY; nodes.len()];
-        for &(node, parent) in &self.order {
-            let above = parent.map_or(DMat4::IDENTITY, |p| world[p as usize]);
-            world[node as usize] = above * local(&nodes[node as usize]);
-        }
+        let world = self.tree.posed(&values).world;
         let seen = DMat4::from_translation(-self.origin);
         let matrix = |&(node, bind): &(Option<u32>, DMat4)| {
             (seen * node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind)).as_mat4()

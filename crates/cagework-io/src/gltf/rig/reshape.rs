@@ -170,23 +170,28 @@ pub(crate) fn reshape(
     if options.expressions {
         expressions::add(&mut edit.json, &targets)?;
     }
-    let mut glb = edit.finish()?;
     report.lift = lift.dot(up);
     report.ground = own;
-    if options.ground && has_moved && options.joints != Joints::Stay {
+    let lifts_clips = options.ground && has_moved && options.joints != Joints::Stay;
+    let locks_feet = options.feet == Feet::Lock && has_moved;
+    if !lifts_clips && !locks_feet {
+        return Ok((edit.finish()?, report));
+    }
+    let mut edited = edit.into_document()?;
+    if lifts_clips {
         let lows = lift::LiftInput { named: named.as_ref(), shared: shared.as_ref(), lift: report.lift, up };
-        let (lifted, clips) = lift::lift_clips(rig, glb, &lows)?;
-        glb = lifted;
+        let (lifted, clips) = lift::lift_clips(rig, edited, &lows)?;
+        edited = lifted;
         report.clip_lifts = clips.iter().map(|clip| clip.lift).collect();
         report.ground = report.ground.map(|ground| ground.with(clips));
     }
-    if options.feet == Feet::Lock && has_moved {
-        let (locked, contacts) = feet::lock(document, glb, up)?;
-        glb = locked;
+    if locks_feet {
+        let (locked, contacts) = feet::lock(document, edited, up)?;
+        edited = locked;
         report.feet = Some([contacts.legs, contacts.n]);
         report.slide = contacts.slide;
     }
-    Ok((glb, report))
+    Ok((edited.write_edited()?, report))
 }
 
 /// Refuses `--joints turn` for VRM 0.
