@@ -36,7 +36,12 @@ fn main() {
     editor.open([(model(), None)], Contents::default());
     let bounds = editor.bounds().expect("there is a model");
     let cage = |margin: f32| subdivided_box(bounds, margin, [4; 3]);
-    let replace = |mesh: PolygonMesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
+    let replace = |mesh: PolygonMesh| Command::ReplaceCage {
+        mesh,
+        controls: None,
+        notices: Vec::new(),
+        rings: Vec::new(),
+    };
     editor.apply(replace(cage(0.1))).expect("a box is a cage");
     editor.amend();
     let n = editor.document().pose.len();

@@ -116,7 +116,7 @@ fn play(session: &mut Session) {
     let player = model.player().expect("it plays").expect("it is a glTF");
     let at = (0..FRAMES).map(|frame| {
         let began = Instant::now();
-        std::hint::black_box(player.at(Some(0), 0.02 * frame as f32, &[]));
+        std::hint::black_box(player.pose_at(Some(0), 0.02 * frame as f32, &[]));
         began.elapsed().as_secs_f64() * 1e3
     });
     println!("play, joints of the humanoid: {}", summary(at.collect()));

@@ -350,7 +350,7 @@ fn folds(mesh: &PolygonMesh) -> Vec<f64> {
 /// Bends the cage. Returns the largest distance of a deformed model vertex from its exactly bent position, relative to
 /// the model's diagonal, and the number of triangles whose normal is flipped against that of the exactly bent triangle.
 fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
-    let bounds = Bounds::of(&model.positions).expect("there are vertices");
+    let bounds = Bounds::around(&model.positions).expect("there are vertices");
     let extent = bounds.extent();
     let long = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("there are three");
     let (u, w) = (Vec3::AXES[long], Vec3::AXES[(long + 1) % 3]);

@@ -144,7 +144,7 @@ fn parts_are_restored_as_in_an_export() {
 #[test]
 fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let (positions, _) = input();
-    let bounds = Bounds::of(&positions).expect("there are some");
+    let bounds = Bounds::around(&positions).expect("there are some");
     // Green coordinates are defined inside the cage only.
     let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
     let green = Coordinates::Green.weights(&positions, &cage, u64::MAX, &NoProgress).expect("all are inside");

@@ -80,7 +80,7 @@ fn poses(cage: &Cage, diagonal: f32) -> [(&'static str, Vec<Vec3>); 3] {
 type Errors = [Vec<f32>; 3];
 
 fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
-    let diagonal = Bounds::of(&splats.positions).map_or(1.0, |bounds| bounds.diagonal());
+    let diagonal = Bounds::around(&splats.positions).map_or(1.0, |bounds| bounds.diagonal());
     let poses = poses(cage, diagonal);
     let fields = poses.each_ref().map(|(_, posed)| weights.pose(cage.positions(), posed));
     let options = BindOptions { grid: FINE_GRID, ..BindOptions::default() };

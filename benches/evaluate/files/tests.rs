@@ -77,7 +77,7 @@ fn assert_well_formed(name: &str, bytes: &[u8]) {
 /// time of these tests.
 fn evaluated(runs: u32) -> HashMap<String, Vec<u8>> {
     let animal = creature();
-    let bounds = Bounds::of(&animal.positions).unwrap();
+    let bounds = Bounds::around(&animal.positions).unwrap();
     let faces = animal.triangles.iter().map(|t| t.to_vec()).collect();
     let mesh = PolygonMesh { positions: animal.positions, faces };
     let model = Model::of_mesh("animal.obj", &mesh, DVec3::ZERO).unwrap();

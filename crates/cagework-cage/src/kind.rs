@@ -237,7 +237,7 @@ fn score(made: &GeneratedCage, model: &TriMesh, skeleton: &Skeleton) -> f64 {
         }
     }
     let diagonal =
-        cagework_core::Bounds::of(&model.positions).map_or(1.0, |bounds| f64::from(bounds.diagonal()));
+        cagework_core::Bounds::around(&model.positions).map_or(1.0, |bounds| f64::from(bounds.diagonal()));
     let rings = made.rings.as_ref().map_or(NO_RINGS, |rings| {
         NO_LIMBS * (1.0 - rings.chains.len() as f64 / skeleton.chains.len() as f64)
     });

@@ -97,7 +97,7 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
         format!("The fit did not converge within {} steps: the pose is that of the last one.", fitted.steps)
     });
 
-    let size = Bounds::of(&bound.model.positions).map_or(1.0, |b| f64::from(b.diagonal()));
+    let size = Bounds::around(&bound.model.positions).map_or(1.0, |b| f64::from(b.diagonal()));
     let before = deform_bound(&weights, &bound.frames, bound.cage.controls().rest());
     let (rms_before, largest_before) = distances(&before, &importance, &to, size);
     let points = importance.iter().filter(|&&w| w > 0.0).count();

@@ -135,7 +135,7 @@ fn inner_info(args: &InfoArgs) -> Result<Option<InnerInfo>, CliError> {
 fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
     let counts = model.counts;
     let bounds =
-        Bounds::of(&model.positions).ok_or_else(|| CliError::file(file.as_ref(), "has no vertices"))?;
+        Bounds::around(&model.positions).ok_or_else(|| CliError::file(file.as_ref(), "has no vertices"))?;
     let welded = weld(&model.positions);
     let cage = match cage_mesh(model).and_then(|mesh| Cage::new(&mesh)) {
         Ok(cage) => CageInfo { valid: true, problem: None, notices: notices(&cage) },

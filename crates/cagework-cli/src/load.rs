@@ -195,7 +195,7 @@ pub(crate) fn generate_for(
 /// # Errors
 /// If `positions` is empty, or the box is too small, too large or too far from the origin for `f32`.
 pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Result<PolygonMesh, CliError> {
-    let bounds = Bounds::of(positions)
+    let bounds = Bounds::around(positions)
         .ok_or_else(|| CliError::Cage { name: "box cage".into(), source: CageError::Empty })?;
     let mesh = subdivided_box(bounds, margin, [divisions; 3]);
     Cage::new(&mesh).map_err(|source| CliError::Mismatch {

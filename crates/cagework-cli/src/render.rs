@@ -108,7 +108,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     camera.set_viewport(glam::Vec2::from(part.map(|s| s as f32)));
     session.frame_all();
-    let bounds = Bounds::of(&points).filter(|_| moving.is_some() || args.turntable.is_some());
+    let bounds = Bounds::around(&points).filter(|_| moving.is_some() || args.turntable.is_some());
     if let Some(bounds) = bounds {
         session.camera_mut().frame(bounds);
     }
@@ -243,7 +243,7 @@ fn half(width: u32) -> u32 {
 /// Returns points on the rims of a vertical cylinder that contains `points`. Its axis goes through the centre of their
 /// bounding box.
 fn cylinder(points: &[Vec3]) -> Vec<Vec3> {
-    let Some(bounds) = Bounds::of(points) else { return Vec::new() };
+    let Some(bounds) = Bounds::around(points) else { return Vec::new() };
     let middle = bounds.center();
     let radius = points.iter().map(|p| (*p - middle).with_y(0.0).length()).fold(0.0, f32::max);
     let rim = (0..72).map(|k| {

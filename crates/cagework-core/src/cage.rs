@@ -342,7 +342,7 @@ fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
     }
     topology::check_repeats(&mesh.faces)?;
     let used: Vec<Vec3> = mesh.faces.iter().flatten().map(|&i| mesh.positions[i as usize]).collect();
-    let bounds = Bounds::of(&used).ok_or(CageError::Empty)?;
+    let bounds = Bounds::around(&used).ok_or(CageError::Empty)?;
     // f64, because the square of a length overflows f32 from 1e19 on.
     let diagonal = bounds.max.as_dvec3().distance(bounds.min.as_dvec3());
     if !(MIN_DIAGONAL..=MAX_DIAGONAL).contains(&diagonal) {

@@ -65,7 +65,7 @@ impl Enclosure {
         let before: Vec<[DVec3; 3]> = changed.iter().map(|t| at(rest, t)).collect();
         let after: Vec<[DVec3; 3]> = changed.iter().map(|t| at(&now, t)).collect();
         let corners: Vec<Vec3> = before.iter().chain(&after).flatten().map(|p| p.as_vec3()).collect();
-        let swept = Bounds::of(&corners);
+        let swept = Bounds::around(&corners);
         let mut outside = Vec::new();
         for (v, (p, &rest)) in self.points.iter().zip(&self.winding).enumerate() {
             let reached = swept.is_some_and(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());

@@ -76,7 +76,7 @@ impl Inpainting {
         let (source_seams, _, source_normals) = welded(source);
         let (seams, cloth, mut normals) = welded(target);
         let TriMesh { positions, triangles } = &cloth;
-        let size = Bounds::of(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
+        let size = Bounds::around(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
         let cosine = |a: Vec3, b: Vec3| a.normalize_or_zero().dot(b);
 
         let tree = TriangleTree::new(source);

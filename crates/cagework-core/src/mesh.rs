@@ -19,7 +19,7 @@ pub struct Bounds {
 impl Bounds {
     /// Computes the bounds of `points`; `None` if there are no points.
     #[must_use]
-    pub fn of(points: &[Vec3]) -> Option<Self> {
+    pub fn around(points: &[Vec3]) -> Option<Self> {
         let first = *points.first()?;
         Some(
             points
@@ -73,7 +73,7 @@ impl PolygonMesh {
     pub fn diagonal(&self) -> f64 {
         let used = self.faces.iter().flatten().filter_map(|&i| self.positions.get(i as usize));
         let finite: Vec<Vec3> = used.copied().filter(|p| p.is_finite()).collect();
-        Bounds::of(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
+        Bounds::around(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
     }
 }
 
@@ -125,9 +125,9 @@ mod tests {
 
     #[test]
     fn bounds_hold_all_points() {
-        let bounds = Bounds::of(&[Vec3::new(1.0, -2.0, 3.0), Vec3::new(-1.0, 0.0, 1.0)]).unwrap();
+        let bounds = Bounds::around(&[Vec3::new(1.0, -2.0, 3.0), Vec3::new(-1.0, 0.0, 1.0)]).unwrap();
         assert_eq!((bounds.min, bounds.max), (Vec3::new(-1.0, -2.0, 1.0), Vec3::new(1.0, 0.0, 3.0)));
         assert_eq!((bounds.extent(), bounds.center()), (Vec3::splat(2.0), Vec3::new(0.0, -1.0, 2.0)));
-        assert_eq!(Bounds::of(&[]), None);
+        assert_eq!(Bounds::around(&[]), None);
     }
 }

@@ -222,7 +222,7 @@ impl Splats {
     /// time to generate a cage is proportional to the number of triangles.
     fn thin_out(&self, kept: &mut Vec<usize>) {
         let centers: Vec<Vec3> = kept.iter().map(|&s| self.positions[s]).collect();
-        let longest = Bounds::of(&centers).map_or(0.0, |bounds| bounds.extent().max_element());
+        let longest = Bounds::around(&centers).map_or(0.0, |bounds| bounds.extent().max_element());
         let size = longest / SHELL_CELLS;
         let cell = |s: usize| (self.positions[s] / size).floor().as_ivec3().to_array();
         let extent = |s: usize| SHELL_SIGMAS * self.scales[s].max_element();
@@ -279,7 +279,7 @@ impl OccupiedCells {
     const CELLS: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
 
     fn by(points: &[Vec3]) -> Self {
-        let Some(bounds) = Bounds::of(points) else { return Self::default() };
+        let Some(bounds) = Bounds::around(points) else { return Self::default() };
         let longest = bounds.extent().max_element();
         for cells in Self::CELLS {
             let size = (longest / cells).max(f32::MIN_POSITIVE);

@@ -336,7 +336,7 @@ impl Editor {
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let (models, cage) = (self.document.models.positions(), &self.document.cage.mesh.positions);
-        match (Bounds::of(models), Bounds::of(cage)) {
+        match (Bounds::around(models), Bounds::around(cage)) {
             (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
             (one, other) => one.or(other),
         }
@@ -457,7 +457,7 @@ impl Editor {
     #[must_use]
     pub fn pull(&self, positions: &[Vec3]) -> Pull {
         let rest = &self.document.cage.mesh.positions;
-        let diagonal = Bounds::of(rest).map_or(0.0, |b| b.diagonal());
+        let diagonal = Bounds::around(rest).map_or(0.0, |b| b.diagonal());
         let symmetry = self.tools.symmetry.then_some(&self.symmetry);
         let radius = if self.tools.proportional_on { self.tools.proportional as f32 * diagonal } else { 0.0 };
         Pull::new(&self.selection, positions, rest, SharedPull { radius, symmetry })
@@ -542,7 +542,7 @@ impl Editor {
         let models: Vec<&Model> = models.iter().map(|member| &*member.model).collect();
         let poses: Vec<(String, Vec<Vec3>)> =
             poses.iter().map(|pose| (pose.name.to_string(), pose.positions.to_vec())).collect();
-        let settings = DocumentSettings::of(&self.document).beside(settings);
+        let settings = DocumentSettings::from_document(&self.document).beside(settings);
         Ok(write_project(&models, &cage.mesh, &poses, &settings)?)
     }
 

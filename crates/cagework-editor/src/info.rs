@@ -55,7 +55,7 @@ impl ModelInfo {
     ///
     /// # Errors
     /// If no model is open.
-    pub fn of(models: &Models) -> Result<Self, EditError> {
+    pub fn from_models(models: &Models) -> Result<Self, EditError> {
         let first = &*models.first()?.model;
         let all = || models.iter().map(|member| &*member.model);
         let sum = |of: fn(&Model) -> usize| all().map(of).sum();
@@ -72,13 +72,13 @@ impl ModelInfo {
             textures: sum(|model| model.counts.textures),
             skins: sum(|model| model.counts.skins),
             joints: sum(|model| model.counts.joints),
-            clips: SharedClip::all(models),
+            clips: SharedClip::group(models),
             targets: TargetView::all(models),
             // Errors of a rig are reported when the rig is used.
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
             vrm: all().any(|model| model.vrm().is_some()),
-            bounds: Bounds::of(models.positions()).unwrap_or_default(),
+            bounds: Bounds::around(models.positions()).unwrap_or_default(),
             suggested_up: suggested_up(models, first),
             notices: all().flat_map(|model| model.notices.clone()).chain(models.origin_notice()).collect(),
             members: models.iter().map(MemberInfo::of).collect(),
@@ -185,7 +185,7 @@ impl CageInfo {
             edges: Topology::new(&mesh.faces).edges.len(),
             faces: mesh.faces.len(),
             quads: mesh.faces.iter().filter(|face| face.len() == 4).count(),
-            bounds: Bounds::of(&mesh.positions).unwrap_or_default(),
+            bounds: Bounds::around(&mesh.positions).unwrap_or_default(),
             notices: notices.chain(made.notices.clone()).collect(),
         }
     }
@@ -206,7 +206,7 @@ pub struct CageState {
 impl CageState {
     /// Collects the properties of a cage or draft; `None` without faces.
     #[must_use]
-    pub fn of(cage: &RestCage) -> Option<Self> {
+    pub fn from_cage(cage: &RestCage) -> Option<Self> {
         (!cage.mesh.faces.is_empty()).then(|| Self {
             usable: cage.set.is_ok(),
             info: CageInfo::of(cage),

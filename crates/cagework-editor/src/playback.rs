@@ -33,13 +33,13 @@ pub struct SharedClip {
 impl SharedClip {
     /// Collects the clips of all models, grouped by name, in the order of the models.
     #[must_use]
-    pub fn all(models: &Models) -> Vec<Self> {
+    pub fn group(models: &Models) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for member in models.iter() {
             for (number, clip) in member.model.clips().iter().enumerate() {
                 let name = clip.label(number);
                 // A file may contain several clips with the same name; each gets a group of its own.
-                let is_same = |other: &&mut Self| other.name == name && other.of(member.id).is_none();
+                let is_same = |other: &&mut Self| other.name == name && other.index_in(member.id).is_none();
                 match all.iter_mut().find(is_same) {
                     Some(other) => {
                         other.of.push((member.id, number));
@@ -54,7 +54,7 @@ impl SharedClip {
 
     /// Index of the clip within a model; `None` if the model has no clip in this group.
     #[must_use]
-    pub fn of(&self, id: u32) -> Option<usize> {
+    pub fn index_in(&self, id: u32) -> Option<usize> {
         self.of.iter().find(|(member, _)| *member == id).map(|(_, clip)| *clip)
     }
 }
@@ -144,7 +144,7 @@ impl Playback {
         let ids = editor.document().models.iter().map(|member| member.id);
         let parts = ids.map(motion).collect::<Result<Vec<_>, BoundError>>()?;
         let models = &editor.document().models;
-        let (clips, up) = (SharedClip::all(models), models.up().turn());
+        let (clips, up) = (SharedClip::group(models), models.up().turn());
         let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
         let (mut played, mut n_palette, mut n_targets) = (Vec::new(), 0, 0);
         for (id, part) in parts {
@@ -208,15 +208,15 @@ impl Playback {
         let Moment { clip, seconds, targets } = &self.shown;
         let clip = clip.and_then(|clip| self.clips.get(clip));
         // The first model with the clip leads those without it that have a skeleton with the same names.
-        let leader = self.played.iter().find_map(|one| match (&one.part, clip?.of(one.id)) {
+        let leader = self.played.iter().find_map(|one| match (&one.part, clip?.index_in(one.id)) {
             (ModelMotion::Player(player), Some(clip)) => Some((player, clip)),
             _ => None,
         });
         let at = |one: &PlayedModel| {
             let own = targets.get(one.targets.clone()).unwrap_or_default();
-            match (&one.part, clip.and_then(|clip| clip.of(one.id)), leader) {
+            match (&one.part, clip.and_then(|clip| clip.index_in(one.id)), leader) {
                 (ModelMotion::Player(player), None, Some((body, clip))) => {
-                    player.at_clip_of(body, clip, *seconds, own)
+                    player.pose_at_clip_of(body, clip, *seconds, own)
                 }
                 (part, clip, _) => posed(part, clip, *seconds, own),
             }
@@ -273,7 +273,7 @@ impl Playback {
 /// Computes joint matrices and target weights of one model at a time of one of its clips.
 fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
     match part {
-        ModelMotion::Player(player) => player.at(clip, seconds, targets),
+        ModelMotion::Player(player) => player.pose_at(clip, seconds, targets),
         ModelMotion::Still(_) => {
             RigPose { palette: vec![Mat4::IDENTITY], targets: Vec::new(), origins: Vec::new() }
         }

@@ -63,7 +63,7 @@ impl PosedModels<'_> {
     /// Position of a surface point; `None` if its model was removed.
     #[must_use]
     pub fn place_of(&self, point: SurfacePoint) -> Option<Vec3> {
-        point.at(&self.editor.document().models, self.positions)
+        point.position(&self.editor.document().models, self.positions)
     }
 
     /// Whether the models cover a vertex of the cage at the pointer.
@@ -174,7 +174,7 @@ impl Editor {
     #[must_use]
     pub fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
         let models = &self.document().models;
-        let at = point.at(models, models.positions())?;
+        let at = point.position(models, models.positions())?;
         let limit = MIRROR_TOLERANCE * self.bounds()?.diagonal();
         let image = Vec3::new(2.0 * self.symmetry().plane() - at.x, at.y, at.z);
         let near = |v: u32| models.positions()[v as usize].distance(image);

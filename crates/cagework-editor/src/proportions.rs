@@ -42,7 +42,7 @@ impl Editor {
 
     /// Sets the factors of a preset; the others become 1.
     pub(crate) fn set_preset(&mut self, name: &str) -> Result<(), EditError> {
-        self.set_proportions(Proportions::of(Some(name), &BTreeMap::new())?)
+        self.set_proportions(Proportions::from_preset(Some(name), &BTreeMap::new())?)
     }
 
     /// Gives the right side the factors of the left side.

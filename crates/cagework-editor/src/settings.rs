@@ -89,7 +89,7 @@ impl Default for PoseSettings {
 impl DocumentSettings {
     /// Collects the settings of a document, as a project stores them.
     #[must_use]
-    pub fn of(document: &Document) -> Self {
+    pub fn from_document(document: &Document) -> Self {
         let Document { cage, poses, shares, transition, pins, sample, has_sample_cage, models, .. } =
             document;
         let in_file = models.up().turned_back(&document.pose);
@@ -273,7 +273,7 @@ mod tests {
             let mut poses = DocumentSettings::default().poses(all.iter().map(|_| empty()), None);
             poses.iter_mut().zip(&all).for_each(|(pose, pins)| pose.pins.clone_from(pins));
             let document = Document { poses: Arc::new(poses), ..one_vertex() };
-            let text = DocumentSettings::of(&document).beside("{}");
+            let text = DocumentSettings::from_document(&document).beside("{}");
             let read = DocumentSettings::read(&text).poses(all.iter().map(|_| empty()), None);
             assert_eq!(read.into_iter().map(|pose| pose.pins).collect::<Vec<_>>(), all);
         }

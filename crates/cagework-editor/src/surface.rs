@@ -18,7 +18,7 @@ pub struct SurfacePoint {
 impl SurfacePoint {
     /// Position of the point when the vertices are at `positions`, `[n_vertices]`; `None` if the model was removed.
     #[must_use]
-    pub fn at(&self, models: &Models, positions: &[Vec3]) -> Option<Vec3> {
+    pub fn position(&self, models: &Models, positions: &[Vec3]) -> Option<Vec3> {
         let corners = models.corners(self.triangle)?;
         let at = |k: usize| Some(self.bary[k] * *positions.get(corners[k] as usize)?);
         Some(at(0)? + at(1)? + at(2)?)

@@ -56,7 +56,7 @@ fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec
     let mut drag = Drag::new(&pull, &rest, &[grab], &[], &Frames::default(), DragOptions::default())
         .expect("valid input");
     let to = drag.start()[0] + by;
-    drag.settle(&[to]);
+    drag.converge(&[to]);
     drag.cage().iter().map(|p| p.as_vec3()).collect()
 }
 
@@ -222,7 +222,7 @@ fn exported_animation_is_the_one_that_plays() {
         let player = written.player().unwrap().unwrap();
         for seconds in [0.1, 0.3, 0.7, 1.9, 2.6] {
             editor.play_at(seconds);
-            let posed = player.at(Some(0), seconds, &[]);
+            let posed = player.pose_at(Some(0), seconds, &[]);
             let exported = skin_vertices(&player.skin, &posed.palette, &posed.targets);
             let played = deformed(&editor.document().pose);
             // Look for each exported vertex among all played ones, because the GLB may repeat vertices of the OBJ.

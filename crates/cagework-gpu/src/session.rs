@@ -246,7 +246,7 @@ impl Session {
 
     /// Sets the field that deforms the splats; `None` for splats at rest. `pose`: positions of the controls.
     pub fn set_field(&mut self, field: Option<Field>, pose: &[Vec3]) {
-        let posed = Bounds::of(pose).or_else(|| self.bounds());
+        let posed = Bounds::around(pose).or_else(|| self.bounds());
         self.renderer.set_field(&self.context, field.zip(posed));
     }
 
@@ -344,7 +344,7 @@ impl Session {
     /// Bounds of model and cage at rest, if any.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
-        let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
+        let model = self.model.as_ref().and_then(|m| Bounds::around(&m.positions));
         let cage = self.cage().map(Cage::bounds);
         match (model, cage) {
             (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
@@ -369,7 +369,7 @@ impl Session {
         if let Some(bounds) = self.bounds() {
             self.camera.set_scene(bounds);
             // The floor is below the model, not the cage.
-            let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
+            let model = self.model.as_ref().and_then(|m| Bounds::around(&m.positions));
             self.renderer.set_bounds(model.unwrap_or(bounds));
         }
     }

@@ -497,7 +497,7 @@ impl SplatKernels {
 
 /// Bounds within which centres are sorted by depth: those of all centres, limited by [`FAR_REACH`].
 fn core_bounds(centers: &[Vec3]) -> Bounds {
-    let Some(all) = Bounds::of(centers) else { return Bounds { min: Vec3::ZERO, max: Vec3::ZERO } };
+    let Some(all) = Bounds::around(centers) else { return Bounds { min: Vec3::ZERO, max: Vec3::ZERO } };
     let (mut low, mut high) = (all.min, all.max);
     let last = centers.len() - 1;
     let skipped = (FAR_SHARE * last as f32) as usize;
@@ -535,7 +535,7 @@ mod tests {
         };
         let centers: Vec<Vec3> = (0..5000).map(|_| Vec3::new(next(), next(), next())).collect();
         let backward = Vec3::new(0.6, -0.48, 0.64);
-        let depths = Depths::new(5000, Bounds::of(&centers).unwrap(), backward, false);
+        let depths = Depths::new(5000, Bounds::around(&centers).unwrap(), backward, false);
         let order = sort_splats(&centers, &depths);
         let step = Vec3::from(depths.axis).length().recip();
         for pair in order.windows(2) {

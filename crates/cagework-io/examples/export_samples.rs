@@ -103,7 +103,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let frames: Vec<_> = (0..10)
                     .map(|k| {
                         let seconds = 0.099 * k as f32;
-                        let posed = player.at(Some(0), seconds, &[]);
+                        let posed = player.pose_at(Some(0), seconds, &[]);
                         let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
                         let positions: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
                         json!({ "seconds": seconds, "positions": positions, "origin": model.origin().to_array() })
@@ -123,7 +123,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;
             std::fs::write(directory.join(format!("{stem}-posed.glb")), posed)?;
         }
-        let bounds = cagework_core::Bounds::of(&model.positions).ok_or("the model has vertices")?;
+        let bounds = cagework_core::Bounds::around(&model.positions).ok_or("the model has vertices")?;
         let cage = cagework_core::subdivided_box(bounds, 0.1, [2, 2, 2]);
         let cage_poses = [("raised".to_owned(), cage.positions.iter().map(|&p| p + Vec3::Y).collect())];
         let project = cagework_io::write_project(&[&model], &cage, &cage_poses, "{}")?;
@@ -165,7 +165,7 @@ fn moments(
 ) -> Result<Vec<u8>, serde_json::Error> {
     let moment = |k: u32| {
         let seconds = 0.099 * k as f32;
-        let posed = player.at_clip_of(clips, 0, seconds, weights);
+        let posed = player.pose_at_clip_of(clips, 0, seconds, weights);
         let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
         let positions: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
         let origin = model.origin().to_array();

@@ -310,7 +310,7 @@ impl Model {
     /// Returns the colours of vertices, sRGB. A vertex without a colour gets one that depends on its position, so that
     /// the shape is visible.
     fn point_colors(&self) -> Vec<Vec3> {
-        let bounds = Bounds::of(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+        let bounds = Bounds::around(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
         let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
         let color = |(k, &p): (u32, &Vec3)| match &self.document {
             Document::Obj(document) if document.colors.contains_key(&k) => Vec3::from(document.colors[&k]),

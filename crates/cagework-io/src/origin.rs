@@ -15,7 +15,7 @@ const MAX_COORDINATE_TO_EXTENT: f32 = 16.0;
 /// 16 times the model's extent away from zero, the origin is zero.
 #[must_use]
 pub fn origin_near(positions: &[Vec3]) -> DVec3 {
-    let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
+    let Some(bounds) = Bounds::around(positions) else { return DVec3::ZERO };
     let (center, extent) = (bounds.center(), bounds.extent().max_element());
     let of_axis = |x: f32| if x.is_finite() && x.abs() > MAX_COORDINATE_TO_EXTENT * extent { x } else { 0.0 };
     // A single point, or a model that rounding collapsed to one point, has extent 0, and its position becomes the
@@ -39,7 +39,7 @@ const MAX_STEP_TO_EXTENT: f32 = 1e-5;
 
 /// Notice that positions lose precision in f32; `None` if they do not.
 pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
-    let extent = Bounds::of(positions)?.extent().max_element();
+    let extent = Bounds::around(positions)?.extent().max_element();
     let far = origin_near(positions).abs().max_element() as f32;
     let step = far.next_up() - far;
     (extent > 0.0 && step > MAX_STEP_TO_EXTENT * extent).then(|| {

@@ -343,7 +343,7 @@ impl Model {
         seconds: f32,
         targets: &[f32],
     ) -> Vec<Vec3> {
-        let posed = player.at(clip, seconds, targets);
+        let posed = player.pose_at(clip, seconds, targets);
         self.up().turned(&skin_vertices(&player.skin, &posed.palette, &posed.targets)).into_owned()
     }
 

@@ -181,7 +181,7 @@ impl Model {
         let mut base: Vec<Vec3> = rest.iter().zip(inpainting.positions()).map(|(a, b)| *a - *b).collect();
         let existing: HashSet<String> =
             clothes.player()?.map_or_else(HashSet::new, |own| own.targets().0.iter().cloned().collect());
-        let palette = player.at(None, 0.0, &[]).palette;
+        let palette = player.pose_at(None, 0.0, &[]).palette;
         let mut added: Vec<ClothTarget> = Vec::new();
         for (name, numbers) in targets {
             if existing.contains(name) {

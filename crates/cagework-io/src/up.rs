@@ -91,7 +91,7 @@ const MIN_FLAT_SIDE_RATIO: usize = 3;
 /// the lowest z rather than at the lowest y. This is a heuristic.
 #[must_use]
 pub fn lies_on_back(positions: &[Vec3]) -> bool {
-    let Some(bounds) = Bounds::of(positions) else { return false };
+    let Some(bounds) = Bounds::around(positions) else { return false };
     let extent = bounds.extent();
     let at = |axis: usize| {
         positions.iter().filter(|p| p[axis] - bounds.min[axis] <= MAX_FLAT_SIDE_DISTANCE * extent.z).count()

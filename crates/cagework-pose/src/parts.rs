@@ -41,7 +41,7 @@ impl Motion {
     /// Fits the rigid motion nearest to the given displacements in least squares (Kabsch 1976). `points`:
     /// `(position, displacement)` pairs; must not be empty.
     #[must_use]
-    pub fn of(points: &[(DVec3, DVec3)]) -> Self {
+    pub fn fit(points: &[(DVec3, DVec3)]) -> Self {
         // No displacement: return exactly zero, without rounding.
         if points.iter().all(|(_, by)| *by == DVec3::ZERO) {
             return Self { centre: DVec3::ZERO, turn: DMat3::ZERO, shift: DVec3::ZERO };
@@ -117,7 +117,7 @@ impl Parts {
         assert!(self.stays.is_empty() || self.stays.len() == rest.len(), "one amount per vertex");
         let motion_of = |piece: &Vec<u32>| {
             let points: Vec<_> = piece.iter().map(|&v| (rest[v as usize], by[v as usize])).collect();
-            Motion::of(&points)
+            Motion::fit(&points)
         };
         let pieces = self.rigid.iter().zip(0..).flat_map(|(piece, k)| piece.iter().map(move |&v| (v, k)));
         HeldMotion {

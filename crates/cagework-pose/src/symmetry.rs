@@ -20,7 +20,7 @@ impl Symmetry {
     /// pairs.
     #[must_use]
     pub fn new(rest: &[Vec3]) -> Self {
-        let Some(bounds) = Bounds::of(rest) else { return Self::default() };
+        let Some(bounds) = Bounds::around(rest) else { return Self::default() };
         let tolerance = IMAGE_TOLERANCE * bounds.diagonal();
         let [origin, middle] = [0.0, bounds.center().x].map(|plane| Self::about(rest, plane, tolerance));
         let pairs = |s: &Self| s.partner.iter().flatten().count();

@@ -48,7 +48,8 @@ pub(crate) fn proportions<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (options, source) = (bind_options(options)?, Source::of("model", model)?);
     let bones = given_bones(bones)?;
-    let proportions = Proportions::of(preset, &factors.unwrap_or_default()).map_err(error::option)?;
+    let proportions =
+        Proportions::from_preset(preset, &factors.unwrap_or_default()).map_err(error::option)?;
     let cage = cage.get();
     let origin = cage.origin();
     let pose = work::run_with(py, progress, |progress| {

@@ -91,7 +91,7 @@ pub(crate) fn pull<'py>(
         let mut drag = drag.map_err(error::pull)?;
         let to: Vec<DVec3> = to.iter().map(|p| p.as_dvec3()).collect();
         drag.go(&to, DRAG_FRAMES);
-        drag.settle(&to);
+        drag.converge(&to);
         Ok(drag.cage())
     })??;
     arrays::wide_array_of(py, posed.into_iter().map(|p| origin + p))

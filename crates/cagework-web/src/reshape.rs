@@ -125,7 +125,7 @@ impl Binder {
         let named = request.bones.into_iter().map(|(bone, joint)| Ok((bone.parse::<Bone>()?, joint)));
         let bones = named.collect::<Result<Vec<_>, UnknownWord>>().map_err(|e| wrong(&e))?;
         let proportions =
-            Proportions::of(request.preset.as_deref(), &request.factors).map_err(|e| wrong(&e))?;
+            Proportions::from_preset(request.preset.as_deref(), &request.factors).map_err(|e| wrong(&e))?;
         let (rig, humanoid) = model.humanoid(&bones)?;
         let set = control_set(cage)?;
         let mut request: PageBindOptions = decode(options)?;

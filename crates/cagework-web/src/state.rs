@@ -260,7 +260,7 @@ impl State {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
         camera.set_viewport(size);
-        if let Some(bounds) = Bounds::of(positions) {
+        if let Some(bounds) = Bounds::around(positions) {
             camera.set_scene(bounds);
             camera.frame(bounds);
         }

@@ -87,7 +87,7 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
 fn scale(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<(), RepairError> {
     const STEPS: usize = 24;
     const STEP: f32 = 1.08;
-    let Some(bounds) = Bounds::of(model) else { return Ok(()) };
+    let Some(bounds) = Bounds::around(model) else { return Ok(()) };
     let center = bounds.center();
     for _ in 0..STEPS {
         for p in &mut mesh.positions {

@@ -197,7 +197,7 @@ fn lower_cage_vertices_of_a_leg_move_only_its_foot() {
     let sample = crate::samples::build("humanoid").unwrap().mesh;
     let sample = ("sample".to_owned(), (sample.positions, sample.triangles), 80);
     for (name, (positions, triangles), target) in mannequins.into_iter().chain([sample]) {
-        let bounds = Bounds::of(&positions).unwrap();
+        let bounds = Bounds::around(&positions).unwrap();
         let height = |p: &Vec3| (p.y - bounds.min.y) / bounds.extent().y;
         let cage = generate(&positions, &triangles, &options(target), &NoProgress).unwrap().cage;
         let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
@@ -285,7 +285,7 @@ fn clearance_that_closes_a_gap_asks_for_no_finer_lattice() {
     // The gap between the legs is at x = 0; a small one between a leg and the trunk is closed.
     assert!(!narrow.notices.concat().contains("at (0.000"), "it stays open: {narrow:?}");
     let made = make(&(positions.clone(), triangles), &CageOptions { clearance: 0.25, ..options(80) });
-    let (model, cage) = (Bounds::of(&positions).unwrap(), Bounds::of(made.cage.positions()).unwrap());
+    let (model, cage) = (Bounds::around(&positions).unwrap(), Bounds::around(made.cage.positions()).unwrap());
     let farthest = (model.min - cage.min).max(cage.max - model.max).max_element();
     let most = made.report.clearance + 5.0 * made.report.voxel_size;
     assert!(farthest < most, "{farthest} instead of {}: {:?}", made.report.clearance, made.report);

@@ -67,7 +67,7 @@ pub(super) fn of_surface(
         let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
         if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
     };
-    let bounds = Bounds::of(positions).filter(|_| !triangles.is_empty()).ok_or(SkeletonError::NoFaces)?;
+    let bounds = Bounds::around(positions).filter(|_| !triangles.is_empty()).ok_or(SkeletonError::NoFaces)?;
     let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     let cell = (max - min).max_element() / VOXELS;
     if !(cell.is_normal() && (max - min).min_element() > cell) {

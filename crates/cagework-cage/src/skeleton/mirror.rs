@@ -46,7 +46,7 @@ impl MirrorPlane {
     /// Finds the mirror plane of the points: x unless they are symmetric in z or y only. `joints` adds a candidate, the
     /// median of their coordinates.
     pub(super) fn of(points: &[Vec3], joints: &[DVec3]) -> Self {
-        let bounds = Bounds::of(points).unwrap_or_default();
+        let bounds = Bounds::around(points).unwrap_or_default();
         let tree = KdTree::new(points, (0..points.len() as u32).collect());
         let find = |axis| Self::along(axis, points, joints, &tree, bounds);
         let planes = [0, 2, 1].map(find);

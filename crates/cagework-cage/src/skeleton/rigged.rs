@@ -52,7 +52,7 @@ pub(super) fn of_rig(positions: &[Vec3], rig: &Rig) -> Result<Skeleton, Skeleton
         }
     }
     let mut tree = JointTree::new(rig, own);
-    let diagonal = f64::from(cagework_core::Bounds::of(positions).unwrap_or_default().diagonal());
+    let diagonal = f64::from(cagework_core::Bounds::around(positions).unwrap_or_default().diagonal());
     let joints = tree.drop_helpers(diagonal);
     if joints > MAX_JOINTS {
         return Err(SkeletonError::TooManyJoints { joints });

@@ -140,7 +140,7 @@ impl FromArgMatches for FactorArgs {
                 named.insert(format!("{side}_{name}"), factor);
             }
         }
-        Ok(Self(Proportions::of(preset, &named).map_err(|e| wrong(e.to_string()))?))
+        Ok(Self(Proportions::from_preset(preset, &named).map_err(|e| wrong(e.to_string()))?))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

@@ -31,7 +31,7 @@ pub(super) fn stretches(mesh: &TriMesh, posed: &[Vec3]) -> Stretches {
         .collect();
     edges.sort_unstable();
     edges.dedup();
-    let size = cagework_core::Bounds::of(&mesh.positions).map_or(0.0, |b| f64::from(b.diagonal()));
+    let size = cagework_core::Bounds::around(&mesh.positions).map_or(0.0, |b| f64::from(b.diagonal()));
     let length = |positions: &[Vec3], edge: [u32; 2]| {
         let [a, b] = edge.map(|v| positions[v as usize].as_dvec3());
         a.distance(b)

@@ -98,7 +98,7 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     drag.go(&to, job.frames);
     let frame_ms = since(begun) / f64::from(job.frames);
     let at_stop = deformed(&pose(&drag));
-    let settle_frames = drag.settle(&to);
+    let settle_frames = drag.converge(&to);
     let cage_pose = pose(&drag);
     check_precision(&cage_pose, &given.job)?;
     let after = deform_finite(weights, frames, &cage_pose).map_err(|e| CliError::file(&given.job, e))?;
@@ -129,7 +129,7 @@ fn check_precision(pose: &[Vec3], job: &Path) -> Result<(), CliError> {
     /// Largest step between coordinates, as a fraction of the pose's size.
     const MAX_STEP: f32 = 0.01;
     let far = pose.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
-    let size = Bounds::of(pose).map_or(0.0, |bounds| bounds.extent().max_element());
+    let size = Bounds::around(pose).map_or(0.0, |bounds| bounds.extent().max_element());
     let step = far.next_up() - far;
     if step <= MAX_STEP * size {
         return Ok(());

@@ -266,7 +266,7 @@ fn edited(glb: &[u8], edit: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
 /// Positions of all nodes at a time of the first clip.
 fn places(glb: &[u8], seconds: f32) -> Vec<glam::Vec3> {
     let model = Model::read_with_clips("a.glb", glb, &mut |_| None, u64::MAX).unwrap();
-    model.player().unwrap().unwrap().at(Some(0), seconds, &[]).origins
+    model.player().unwrap().unwrap().pose_at(Some(0), seconds, &[]).origins
 }
 
 #[test]

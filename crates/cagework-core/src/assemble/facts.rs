@@ -37,7 +37,7 @@ impl RowFacts {
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
-    pub fn of(row: &[Row], sums: Sums, raw: Option<RawRow>) -> Self {
+    pub fn from_row(row: &[Row], sums: Sums, raw: Option<RawRow>) -> Self {
         // Comparisons instead of `min` and `max`, whose NaN handling has no single wasm instruction.
         let (mut lows, mut highs) = ([f32::INFINITY; LANES], ZERO);
         for row in row {

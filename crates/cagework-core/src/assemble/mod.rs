@@ -263,7 +263,7 @@ impl VertexRun<'_> {
                 (raw, raw)
             };
             let raw = (!has_offset).then_some(RawRow { sums: raw, lowest });
-            self.facts.push(RowFacts::of(&row, stored, raw));
+            self.facts.push(RowFacts::from_row(&row, stored, raw));
             take(self, v, &row);
         }
     }

@@ -108,7 +108,7 @@ pub(super) fn refuse_outside(
 
 /// Creates the [`BindError::NoneInside`] for a model whose vertices are all outside. `positions` must not be empty.
 fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
-    let model = Bounds::of(positions).unwrap_or(cage.bounds());
+    let model = Bounds::around(positions).unwrap_or(cage.bounds());
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 

@@ -35,7 +35,7 @@ const COUNTING_GRID: u32 = 16;
 pub(super) fn check_overlaps(cage: &Cage) -> Result<(), BindError> {
     let lines = shoot_lines(cage, &Grid::cubic(cage.bounds(), COUNTING_GRID));
     let outer = lines.iter().map(Lines::n_hits).sum::<usize>().max(1);
-    let walls = Overlaps::of(&lines).inner as f64 / outer as f64;
+    let walls = Overlaps::sum(&lines).inner as f64 / outer as f64;
     let limit = MAX_INNER_WALLS;
     if walls > limit { Err(BindError::Overlaps { walls, limit }) } else { Ok(()) }
 }

@@ -46,7 +46,7 @@ pub fn push_out(surface: &TriMesh, points: &mut [Vec3], least: &[f32]) -> Separa
     let (_, surface, _) = welded(surface);
     let (tree, normals) = (TriangleTree::new(&surface), Pseudonormals::new(&surface));
     let least_depth =
-        MIN_DEPTH * Bounds::of(&surface.positions).map_or(0.0, |bounds| f64::from(bounds.diagonal()));
+        MIN_DEPTH * Bounds::around(&surface.positions).map_or(0.0, |bounds| f64::from(bounds.diagonal()));
     // Signed distance, negative inside, and the closest point with the direction out of the surface.
     let side = |p: Vec3| {
         let hit = tree.closest(p)?;

@@ -163,12 +163,12 @@ impl Stencils {
 
     /// Nodes (row of the field, weight) and hats (control, weight) of each vertex.
     pub fn iter(&self) -> impl Iterator<Item = (Entries<'_>, Entries<'_>)> {
-        (0..self.len()).map(|vertex| self.at(vertex))
+        (0..self.len()).map(|vertex| self.row(vertex))
     }
 
     /// Nodes and hats of a vertex.
     #[must_use]
-    pub fn at(&self, vertex: usize) -> (Entries<'_>, Entries<'_>) {
+    pub fn row(&self, vertex: usize) -> (Entries<'_>, Entries<'_>) {
         let [nodes, hats] = [&self.node_start, &self.hat_start]
             .map(|start| start[vertex] as usize..start[vertex + 1] as usize);
         (&self.nodes[nodes], &self.hats[hats])

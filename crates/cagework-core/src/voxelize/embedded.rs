@@ -71,7 +71,7 @@ impl Embedding {
     /// Overlaps of parts of the cage. Only walls of the union of all parts bound the interior.
     #[must_use]
     pub fn overlaps(&self) -> Overlaps {
-        Overlaps::of(&self.lines)
+        Overlaps::sum(&self.lines)
     }
 
     /// Peak size of lines, levels and temporary votes in bytes.

@@ -65,7 +65,7 @@ impl Overlaps {
 
     /// Overlaps found along any of the three axes.
     #[must_use]
-    pub fn of(lines: &[Lines; 3]) -> Self {
+    pub fn sum(lines: &[Lines; 3]) -> Self {
         let all = lines.iter().map(|lines| &lines.overlaps);
         all.fold(Self::default(), |all, found| all.and(*found))
     }

@@ -417,7 +417,7 @@ impl Camera {
 
     /// Fits points into the free part of the picture, with the target at the depth of the centre of their bounds.
     pub fn frame_points(&mut self, points: &[Vec3]) {
-        let Some(bounds) = Bounds::of(points) else { return };
+        let Some(bounds) = Bounds::around(points) else { return };
         self.target = bounds.center();
         self.fit(points);
         self.step_back(FRAME_MARGIN / FIT_MARGIN * self.kept / (2.0 * self.tangents()));

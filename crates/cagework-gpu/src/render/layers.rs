@@ -60,7 +60,7 @@ mod tests {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::ONE.with_z(0.0), Vec3::Y];
         let mut camera = Camera::default();
         (camera.yaw, camera.pitch, camera.projection) = (0.0, 0.0, Projection::Orthographic);
-        let bounds = Bounds::of(&corners).unwrap();
+        let bounds = Bounds::around(&corners).unwrap();
         camera.set_scene(bounds);
         camera.set_viewport(Vec2::splat(100.0));
         camera.frame(bounds);

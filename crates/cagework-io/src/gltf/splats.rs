@@ -168,7 +168,7 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, color_space: Option<&str>) -> 
         return Err(WriteError::TooLarge { bytes });
     }
     glb.floats("POSITION", splats.positions.iter().map(Vec3::to_array));
-    let bounds = cagework_core::Bounds::of(&splats.positions);
+    let bounds = cagework_core::Bounds::around(&splats.positions);
     let [min, max] = bounds.map_or([[0.0; 3]; 2], |b| [b.min.to_array(), b.max.to_array()]);
     (glb.accessors[0]["min"], glb.accessors[0]["max"]) = (json!(min), json!(max));
     let of = |name: &str| format!("{SPLATS_EXTENSION}:{name}");

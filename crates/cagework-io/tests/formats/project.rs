@@ -143,7 +143,7 @@ fn up_axis_is_kept_and_other_programs_see_the_files_axes() {
 }
 
 fn bounds(positions: &[Vec3]) -> cagework_core::Bounds {
-    cagework_core::Bounds::of(positions).unwrap()
+    cagework_core::Bounds::around(positions).unwrap()
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn assert_dressed(dressed: &Model, clothes: &[Vec3]) {
     assert!(dressed.positions.iter().zip(clothes).map(off).fold(0.0, f32::max) < 2e-6);
     let player = dressed.player().unwrap().unwrap();
     let skin = &player.skin;
-    let pose = player.at(None, 0.0, &[]);
+    let pose = player.pose_at(None, 0.0, &[]);
     let shown = skin_vertices(skin, &pose.palette, &pose.targets);
     assert!(shown.iter().zip(clothes).map(off).fold(0.0, f32::max) < 2e-6);
     // The palette of each slot: its node, then the joints.
@@ -136,7 +136,7 @@ fn a_glb_keeps_its_names_and_transforms() {
         [&json!("shirt"), &json!([0.01, 0.01, 0.01])]
     );
     let player = dressed.player().unwrap().unwrap();
-    let shown = skin_vertices(&player.skin, &player.at(None, 0.0, &[]).palette, &[]);
+    let shown = skin_vertices(&player.skin, &player.pose_at(None, 0.0, &[]).palette, &[]);
     for (a, b) in shown.iter().zip(&clothes.positions) {
         assert!(a.distance(*b) < 1e-5, "{a} {b}");
     }
@@ -170,7 +170,7 @@ fn a_body_whose_rest_differs_from_its_bind_pose_is_dressed_at_rest() {
     let (dressed, _, report) = transferred(&rigged().glb(), &clothes, None);
     assert!(report.origins.matched > 0);
     let player = dressed.player().unwrap().unwrap();
-    let pose = player.at(None, 0.0, &[]);
+    let pose = player.pose_at(None, 0.0, &[]);
     let shown = skin_vertices(&player.skin, &pose.palette, &pose.targets);
     let fits = |p: &Vec3| clothes.positions.iter().any(|q| q.distance(*p) < 1e-5);
     assert!(shown.iter().all(fits) && dressed.positions.iter().all(fits));
@@ -182,7 +182,7 @@ fn clothes_follow_a_clip_of_the_body() {
     let (dressed, ..) = transfer(&read("shirt.obj", obj(&shirt).as_bytes()).unwrap());
     let body = read("body.glb", &body()).unwrap().player().unwrap().unwrap();
     let player = dressed.player().unwrap().unwrap();
-    let at = player.at_clip_of(&body, 0, 1.0, &[]);
+    let at = player.pose_at_clip_of(&body, 0, 1.0, &[]);
     // Linear blend skinning: the share y/2 turns by 1.5 radians about the joint at y = 1.
     let turned = |p: Vec3| Vec3::Y + Quat::from_rotation_z(1.5) * (p - Vec3::Y);
     for (p, shown) in dressed.positions.iter().zip(skin_vertices(&player.skin, &at.palette, &[])) {
@@ -231,7 +231,7 @@ fn displacements(model: &Model, name: &str) -> Vec<Vec3> {
     let (names, defaults) = player.targets();
     let weights: Vec<f32> =
         names.iter().zip(defaults).map(|(own, &default)| if own == name { 1.0 } else { default }).collect();
-    let shown = skin_vertices(&player.skin, &player.at(None, 0.0, &[]).palette, &weights);
+    let shown = skin_vertices(&player.skin, &player.pose_at(None, 0.0, &[]).palette, &weights);
     shown.iter().zip(&model.positions).map(|(a, b)| *a - *b).collect()
 }
 
@@ -305,7 +305,7 @@ fn new_targets_stay_at_their_default_weight_in_splines() {
     let player = dressed.player().unwrap().unwrap();
     assert_eq!(player.targets().0[..2], ["puffed", "wide"]);
     for seconds in [0.0, 0.25, 0.5, 0.75, 1.0] {
-        assert_eq!(player.at(Some(0), seconds, &[]).targets[1], 0.5, "{seconds} s");
+        assert_eq!(player.pose_at(Some(0), seconds, &[]).targets[1], 0.5, "{seconds} s");
     }
 }
 

@@ -152,7 +152,7 @@ fn as_splats(model: &Model) {
 fn as_rig(model: &Model, choice: u32) {
     if let Ok(Some(player)) = model.player() {
         for clip in 0..player.clips().len().min(2) {
-            let posed = player.at(Some(clip), 0.4, &[]);
+            let posed = player.pose_at(Some(clip), 0.4, &[]);
             let _ = skin_vertices(&player.skin, &posed.palette, &posed.targets);
         }
     }
@@ -218,7 +218,7 @@ fn as_model(model: &Model, choice: u32) {
 /// Checks, repairs and rechecks a cage, and binds points in its bounding box.
 fn as_cage(mesh: &PolygonMesh, choice: u32) {
     let finite: Vec<Vec3> = mesh.positions.iter().copied().filter(|p| p.is_finite()).collect();
-    let bounds = Bounds::of(&finite).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+    let bounds = Bounds::around(&finite).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
     let points = lattice(bounds);
     let found = check(mesh, Some(&points), Some(GRID));
     assert!(!found.valid || Cage::new(mesh).is_ok());

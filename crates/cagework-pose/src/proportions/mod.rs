@@ -161,7 +161,7 @@ impl Proportions {
     ///
     /// # Errors
     /// [`ProportionError`] as for [`Self::set`], or if no preset has the name.
-    pub fn of(preset: Option<&str>, named: &BTreeMap<String, f64>) -> Result<Self, ProportionError> {
+    pub fn from_preset(preset: Option<&str>, named: &BTreeMap<String, f64>) -> Result<Self, ProportionError> {
         let mut proportions = Self::default();
         if let Some(name) = preset {
             let none = || ProportionError::Preset {
@@ -237,7 +237,7 @@ impl TryFrom<BTreeMap<String, f64>> for Proportions {
     type Error = ProportionError;
 
     fn try_from(named: BTreeMap<String, f64>) -> Result<Self, ProportionError> {
-        Self::of(None, &named)
+        Self::from_preset(None, &named)
     }
 }
 
@@ -314,7 +314,7 @@ impl Preset {
     /// # Errors
     /// [`ProportionError`]; a test sets every preset, so this does not occur.
     pub fn proportions(&self) -> Result<Proportions, ProportionError> {
-        Proportions::of(Some(self.name), &BTreeMap::new())
+        Proportions::from_preset(Some(self.name), &BTreeMap::new())
     }
 }
 

@@ -55,7 +55,7 @@ impl Figure {
         let skin = skin_of_bones(&self.rig, &self.humanoid);
         let diagonal = |at: &[Vec3]| {
             let own = at.iter().zip(&skin).filter(|(_, row)| row[bone as usize] > 0.99).map(|(p, _)| *p);
-            cagework_core::Bounds::of(&own.collect::<Vec<_>>()).unwrap().diagonal()
+            cagework_core::Bounds::around(&own.collect::<Vec<_>>()).unwrap().diagonal()
         };
         diagonal(at) / diagonal(&self.positions)
     }

@@ -54,7 +54,7 @@ impl Pull {
         if (rows, columns) != (vertices, n) {
             return Err(PullError::Shape { rows, columns, vertices, controls: n });
         }
-        let size = Bounds::of(&mesh.positions).ok_or(PullError::Empty)?.diagonal();
+        let size = Bounds::around(&mesh.positions).ok_or(PullError::Empty)?.diagonal();
         // A model that is a single point has no size: use the cage's.
         let size = if size > 0.0 { size } else { cage.diagonal() };
         let rest: Vec<DVec3> = controls.rest().iter().copied().map(Vec3::as_dvec3).collect();

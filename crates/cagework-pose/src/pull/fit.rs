@@ -269,7 +269,7 @@ impl Pull {
             let at = place(row, &self.cage);
             (at, to.as_dvec3() - at)
         });
-        let motion = Motion::of(&points.collect::<Vec<_>>());
+        let motion = Motion::fit(&points.collect::<Vec<_>>());
         self.cage.iter().map(|&c| c + motion.by(c)).collect()
     }
 }

@@ -97,7 +97,7 @@ impl Drag {
     }
 
     /// Runs frames with the grabs at `to` until the cage settles, at most 60. Returns the number of frames.
-    pub fn settle(&mut self, to: &[DVec3]) -> u32 {
+    pub fn converge(&mut self, to: &[DVec3]) -> u32 {
         let mut frames = 0;
         while frames == 0 || frames < MAX_SETTLING_FRAMES && !self.is_settled() {
             self.frame(to);

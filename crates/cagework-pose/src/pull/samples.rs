@@ -141,7 +141,7 @@ fn areas(mesh: &TriMesh) -> Vec<f64> {
 /// Samples vertices by farthest-point sampling (Gonzalez 1985). Returns the samples, and the nearest sample of each
 /// vertex. `None` without vertices.
 fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
-    let center = Bounds::of(positions)?.center();
+    let center = Bounds::around(positions)?.center();
     let farthest = |distances: &[f32]| {
         distances.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0))).map(|(i, _)| i)
     };

@@ -176,7 +176,7 @@ fn grabs_that_make_a_half_turn_turn_the_model() {
         let mut drag = b.drag(&b.rest(), &grabs, &[], Reach::Whole);
         let to: Vec<DVec3> = drag.start().iter().map(|p| turn * *p).collect();
         drag.go(&to, frames);
-        drag.settle(&to);
+        drag.converge(&to);
         let expected: Vec<DVec3> = b.rest().iter().map(|p| turn * *p).collect();
         assert!(b.apart(&drag.cage(), &expected) < 1e-2, "{}", b.apart(&drag.cage(), &expected));
     }
@@ -454,7 +454,7 @@ impl BoneBar {
 #[test]
 fn grabs_and_pins_hold_while_a_bone_rotates() {
     let bar = BoneBar::new();
-    let (pose, size) = (bar.turned(60.0), f64::from(Bounds::of(&bar.mesh.positions).unwrap().diagonal()));
+    let (pose, size) = (bar.turned(60.0), f64::from(Bounds::around(&bar.mesh.positions).unwrap().diagonal()));
     let to = bar.model(&pose);
     let nearest = |at: Vec3| {
         let all = (0..).zip(&bar.mesh.positions);
@@ -472,7 +472,7 @@ fn grabs_and_pins_hold_while_a_bone_rotates() {
         let mut drag = Drag::new(&bar.pull, &start, grabs, &pins, &bar.binding.frames, options).unwrap();
         let goals: Vec<DVec3> = handles[..n_grabs].iter().map(|&v| to[v as usize].as_dvec3()).collect();
         drag.go(&goals, 30);
-        drag.settle(&goals);
+        drag.converge(&goals);
         let posed: Vec<Vec3> = drag.cage().iter().map(|p| p.as_vec3()).collect();
         let after = bar.model(&posed);
         let mut off = 0.0_f64;

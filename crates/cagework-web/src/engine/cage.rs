@@ -25,7 +25,7 @@ impl Engine {
     /// If no model is open.
     #[wasm_bindgen(js_name = boxCage, unchecked_return_type = "CageArrays")]
     pub fn box_cage(&self, divisions: u32) -> Answer<JsValue> {
-        let bounds = self.read(|state| Bounds::of(state.models().positions()));
+        let bounds = self.read(|state| Bounds::around(state.models().positions()));
         let bounds = bounds.ok_or_else(|| Fault::missing("model", "open one first"))?;
         let longest = bounds.extent().max_element().max(f32::MIN_POSITIVE);
         let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
@@ -87,7 +87,7 @@ impl Engine {
     /// Properties of the cage for panels; undefined without a cage.
     #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
     pub fn cage_state(&self) -> JsValue {
-        self.read(|state| optional(CageState::of(state.cage())))
+        self.read(|state| optional(CageState::from_cage(state.cage())))
     }
 
     /// Applies a command to the document. With a label, adds a step to the history; otherwise the next history step

@@ -73,7 +73,7 @@ impl Engine {
         self.change(|state| {
             let selected: Vec<Vec3> =
                 state.editor.selection.vertices().iter().map(|&i| state.pose()[i as usize]).collect();
-            match Bounds::of(&selected) {
+            match Bounds::around(&selected) {
                 Some(bounds) => state.camera.frame(bounds),
                 None => state.frame_all(),
             }

@@ -44,8 +44,8 @@ impl Engine {
         clip: u32,
     ) -> Answer<Vec<u8>> {
         let options = decode(options)?;
-        let clips = self.read(|state| SharedClip::all(state.models()));
-        let clip = clips.get(clip as usize).and_then(|clip| clip.of(id));
+        let clips = self.read(|state| SharedClip::group(state.models()));
+        let clip = clips.get(clip as usize).and_then(|clip| clip.index_in(id));
         self.export(|state| state.bound_document().glb(id, &options, clip))
     }
 

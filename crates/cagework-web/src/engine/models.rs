@@ -89,7 +89,7 @@ impl Engine {
     /// If no model is open.
     #[wasm_bindgen(js_name = modelInfo, unchecked_return_type = "ModelInfo")]
     pub fn model_info(&self) -> Answer<JsValue> {
-        self.read(|state| Ok(object(&ModelInfo::of(state.models())?)))
+        self.read(|state| Ok(object(&ModelInfo::from_models(state.models())?)))
     }
 
     /// Painted amount of each vertex of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, empty

@@ -280,7 +280,7 @@ fn fitted_points_fill_the_picture() {
     for mut camera in both() {
         for size in [Vec2::new(800.0, 600.0), Vec2::new(300.0, 900.0)] {
             camera.set_viewport(size);
-            camera.set_scene(Bounds::of(&corners).expect("the list is not empty"));
+            camera.set_scene(Bounds::around(&corners).expect("the list is not empty"));
             camera.fit(&corners);
             let places =
                 corners.map(|c| camera.project(c).expect("the point is visible").position / size * 2.0 - 1.0);

@@ -200,7 +200,7 @@ fn lows(
 ) -> Option<[f64; 2]> {
     let up = up.as_vec3();
     let at = |k: usize, clip: Option<usize>, seconds: f32| -> f64 {
-        let posed = players[k].at(clip, seconds, &[]);
+        let posed = players[k].pose_at(clip, seconds, &[]);
         let low = |all: &mut dyn Iterator<Item = Vec3>| all.map(|p| p.dot(up)).fold(f32::INFINITY, f32::min);
         f64::from(match points {
             Points::Vertices(skins) => {

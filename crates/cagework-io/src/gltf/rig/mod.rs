@@ -183,7 +183,7 @@ impl<'a> Rig<'a> {
         }
         let states: Vec<Vec3> =
             rest.iter().copied().chain(rig.extras.iter().map(|&p| relative(p, origin))).collect();
-        rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
+        rig.diagonal = Bounds::around(&states).map_or(0.0, |b| f64::from(b.diagonal()));
         rig.add_nodes();
         rig.hold_without_skins();
         rig.vrm_points = vrm::points(document, &rig.worlds, rig.diagonal);

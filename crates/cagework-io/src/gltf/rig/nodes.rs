@@ -214,7 +214,7 @@ impl Rig<'_> {
             let inside: Vec<(DVec3, DVec3)> =
                 points.filter(|&(v, _)| !is_outside[v]).map(|(v, rest)| (rest, by[v])).collect();
             if inside.len() >= MIN_RIGID_VERTICES {
-                return (node, Motion::of(&inside));
+                return (node, Motion::fit(&inside));
             }
             let turn = rotation(gradient(by, at, self.diagonal)).unwrap_or(DMat3::IDENTITY);
             (node, Motion::about(self.worlds.world[node as usize].w_axis.truncate(), turn, by[at]))
@@ -238,7 +238,7 @@ impl Rig<'_> {
         let points = self.parts.iter().filter(is_carried).flat_map(|part| (part.first..).zip(part.rest()));
         let inside = points.filter(|&(v, _)| !given.is_outside[v]);
         let inside: Vec<(DVec3, DVec3)> = inside.map(|(v, rest)| (rest, given.by[v])).collect();
-        (inside.len() >= MIN_RIGID_VERTICES).then(|| Motion::of(&inside))
+        (inside.len() >= MIN_RIGID_VERTICES).then(|| Motion::fit(&inside))
     }
 
     /// Moves the nodes that follow the cage: writes their transforms to `json` and returns their changes.

@@ -172,14 +172,14 @@ impl Player {
     /// Evaluates a clip at a time in seconds; `None` is the rest pose. `targets`: weights of the morph targets that the
     /// clip does not animate, `[n_targets]`; empty for the file's defaults.
     #[must_use]
-    pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
+    pub fn pose_at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
         let clip = clip.and_then(|clip| self.clips.get(clip));
         self.with(clip.into_iter().flat_map(|clip| clip.at(seconds)), targets)
     }
 
-    /// Like [`Self::at`], for a clip of another file. It moves the nodes that have the same names.
+    /// Like [`Self::pose_at`], for a clip of another file. It moves the nodes that have the same names.
     #[must_use]
-    pub fn at_clip_of(&self, other: &Self, clip: usize, seconds: f32, targets: &[f32]) -> RigPose {
+    pub fn pose_at_clip_of(&self, other: &Self, clip: usize, seconds: f32, targets: &[f32]) -> RigPose {
         let own = |n: usize| {
             let name = other.node_names.get(n)?.as_ref()?;
             self.node_names.iter().position(|own| own.as_ref() == Some(name))

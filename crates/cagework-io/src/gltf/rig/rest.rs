@@ -47,7 +47,7 @@ pub(crate) fn rest_rig(document: &GltfDocument, origin: DVec3) -> Result<Option<
         }
     }
     let player = Player::new(document, document, origin)?;
-    let at = player.at(None, 0.0, &[]).origins;
+    let at = player.pose_at(None, 0.0, &[]).origins;
     let joint = |(&node, parent): (&u32, Option<u32>)| Joint {
         name: name_of(&document.json, "nodes", node, "node"),
         parent,

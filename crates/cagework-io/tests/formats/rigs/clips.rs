@@ -20,7 +20,7 @@ fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_
     }
     // Joints keep their orientation, so only translations of the palette change.
     for seconds in [0.0, 0.4, 1.0] {
-        let [a, b] = [&old, &new].map(|player| player.at(Some(0), seconds, &[]));
+        let [a, b] = [&old, &new].map(|player| player.pose_at(Some(0), seconds, &[]));
         let linear = |m: &glam::Mat4| glam::Mat3::from_mat4(*m);
         for (a, b) in a.palette.iter().zip(&b.palette) {
             assert!(linear(a).abs_diff_eq(linear(b), ROUNDING_TOLERANCE), "at {seconds} s");
@@ -71,7 +71,7 @@ fn splines_follow_the_rule_between_their_keys() {
     let model = read(&rig.glb());
     let (before, after) = (player(&model), player(&read(&reshaped(&model, Joints::Follow).0)));
     // `f` scales heights by 1.2, so the translations of the root scale by 1.2 as well.
-    let root = |player: &Player, seconds: f32| player.at(Some(0), seconds, &[]).origins[1];
+    let root = |player: &Player, seconds: f32| player.pose_at(Some(0), seconds, &[]).origins[1];
     for seconds in [0.0, 0.3, 0.7, 1.0] {
         let [old, new] = [&before, &after].map(|player| root(player, seconds));
         let expected = f(Vec3::ZERO) + 1.2 * old;
@@ -164,7 +164,7 @@ fn shared_samplers_and_accessors_are_separated() {
     assert!(outputs[0] != outputs[1] && outputs[1] != outputs[2] && outputs[0] != outputs[2], "{outputs:?}");
     assert!(outputs.contains(&root.as_u64().unwrap()), "{outputs:?}: the shared accessor is reused");
     // All translations scale by 1.2, as heights do under `f`.
-    let at = |bytes: &[u8], seconds| player(&read(bytes)).at(Some(0), seconds, &[]).origins;
+    let at = |bytes: &[u8], seconds| player(&read(bytes)).pose_at(Some(0), seconds, &[]).origins;
     let [old, new] = [&before, &after].map(|bytes| [at(bytes, 0.0), at(bytes, 1.0)]);
     let way = |of: &[Vec<Vec3>; 2], node: usize| of[1][node] - of[0][node];
     for node in [1, 2] {
@@ -217,7 +217,10 @@ fn channels_with_too_few_values_are_ignored() {
         let model = read(&rig.glb());
         let player = player(&model);
         assert_eq!(player.clips()[0].channels, whole - 1, "{interpolation}");
-        assert_eq!(player.at(Some(0), 0.5, &[]).palette.len(), player.at(None, 0.0, &[]).palette.len());
+        assert_eq!(
+            player.pose_at(Some(0), 0.5, &[]).palette.len(),
+            player.pose_at(None, 0.0, &[]).palette.len()
+        );
         assert!(model.states(Some(&player.clips()[0].label(0))).is_ok());
     }
 }
@@ -260,6 +263,6 @@ fn pointers_to_the_weights_of_a_mesh_play_its_copies() {
     assert_eq!(json_of(&bytes)["meshes"].as_array().unwrap().len(), 2);
     // The last key of the weights is [1, 0.5].
     for played in [player(&model), player(&read(&bytes))] {
-        assert_eq!(played.at(Some(0), 1.0, &[]).targets, [1.0, 0.5, 1.0, 0.5]);
+        assert_eq!(played.pose_at(Some(0), 1.0, &[]).targets, [1.0, 0.5, 1.0, 0.5]);
     }
 }

@@ -264,7 +264,7 @@ fn step_tracks_are_rescaled_like_linear_ones() {
     for at in [0.0, 1.0] {
         assert_eq!(shown(&linear, Some(0), at, &[]), shown(&step, Some(0), at, &[]), "at a key");
     }
-    let [root, key] = [0.9, 0.0].map(|at| step.at(Some(0), at, &[]).origins[1]);
+    let [root, key] = [0.9, 0.0].map(|at| step.pose_at(Some(0), at, &[]).origins[1]);
     assert_eq!(root, key, "it holds until the next key");
 }
 
@@ -282,7 +282,7 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
         let bytes = reshaped(&model, joints).0;
         // Compare the states of the target with default weight 0, at weights 0 and 1.
         assert_targets(&model, &bytes, &[1], 2.0 * ROUNDING_TOLERANCE);
-        let [before, after] = [&model, &read(&bytes)].map(|m| player(m).at(None, 0.0, &[]).palette);
+        let [before, after] = [&model, &read(&bytes)].map(|m| player(m).pose_at(None, 0.0, &[]).palette);
         for (a, b) in before.iter().zip(&after) {
             assert!(a.abs_diff_eq(*b, 2.0 * ROUNDING_TOLERANCE), "{a} {b}");
         }

@@ -134,7 +134,7 @@ fn slide(glb: &[u8], velocity: f32) -> f32 {
             // Skip the first and last tenth of a planted phase. Contacts are detected by differences of neighbouring
             // samples, which at both ends of the phase include the swing.
             let u = (t / CYCLE + 0.5 * side as f32).fract();
-            let at = player.at(Some(0), t, &[]).origins[node] - vec3(velocity * t, 0.0, 0.0);
+            let at = player.pose_at(Some(0), t, &[]).origins[node] - vec3(velocity * t, 0.0, 0.0);
             if !(0.05..0.45).contains(&u) {
                 last = None;
                 continue;
@@ -174,7 +174,7 @@ fn planted_feet_slide_less_than_a_quarter() {
         let found = read(&locked);
         assert_eq!(found.positions, read(&free).positions, "{what}");
         for k in 0..50 {
-            let at = player(&found).at(Some(0), 0.04 * k as f32, &[]).origins;
+            let at = player(&found).pose_at(Some(0), 0.04 * k as f32, &[]).origins;
             for leg in [[1, 2, 3], [4, 5, 6]] {
                 let [thigh, shin] = [at[leg[0]].distance(at[leg[1]]), at[leg[1]].distance(at[leg[2]])];
                 assert!((thigh - 1.4).abs() < 1e-3 && (shin - 1.1).abs() < 1e-3, "{what}: {thigh} {shin}");
@@ -242,7 +242,7 @@ fn clips_keep_the_height_of_their_lowest_point() {
             assert!((f64::from(with - without) - report.lift - report.clip_lifts[0]).abs() < 1e-5, "{what}");
         }
         // `ground` moves the joints only vertically.
-        let at = |glb: &[u8]| player(&read(glb)).at(Some(0), 0.7, &[]).origins;
+        let at = |glb: &[u8]| player(&read(glb)).pose_at(Some(0), 0.7, &[]).origins;
         for (a, b) in at(&sunk).into_iter().zip(at(&stood)).take(7) {
             assert!((a - b).with_y(0.0).length() < 1e-5, "{what}");
         }
@@ -260,7 +260,7 @@ fn loops_stay_loops() {
             reshaped(&model, 0.0, &ReshapeOptions { feet: Feet::Lock, ..ReshapeOptions::default() });
         let what = format!("{phase} {on_spot} {report:?}");
         let player = player(&read(&locked));
-        let [first, last] = [0.0, CYCLES * CYCLE].map(|t| player.at(Some(0), t, &[]).origins);
+        let [first, last] = [0.0, CYCLES * CYCLE].map(|t| player.pose_at(Some(0), t, &[]).origins);
         // During the two cycles of the clip, all joints travel as far as the hips.
         let travel = last[0] - first[0];
         for k in 0..7 {
@@ -303,7 +303,7 @@ fn feet_of_a_mirrored_armature_are_held() {
     }
     assert!((mirrored.1.slide[1] - plain.1.slide[1]).abs() < 1e-5, "{:?} {:?}", mirrored.1, plain.1);
     for k in 0..50 {
-        let at = |glb: &[u8]| player(&read(glb)).at(Some(0), 0.04 * k as f32, &[]).origins[..7].to_vec();
+        let at = |glb: &[u8]| player(&read(glb)).pose_at(Some(0), 0.04 * k as f32, &[]).origins[..7].to_vec();
         let expected: Vec<Vec3> = at(&plain.0).iter().map(|&p| p.with_z(-p.z)).collect();
         super::assert_near(&at(&mirrored.0), &expected, 1e-5, &format!("key {k}"));
     }

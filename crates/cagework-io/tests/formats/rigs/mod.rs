@@ -27,7 +27,7 @@ fn player(model: &Model) -> Player {
 }
 
 fn shown(player: &Player, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Vec<Vec3> {
-    let posed = player.at(clip, seconds, targets);
+    let posed = player.pose_at(clip, seconds, targets);
     skin_vertices(&player.skin, &posed.palette, &posed.targets)
 }
 
@@ -160,7 +160,7 @@ fn joints_follow_the_cage_and_keep_skinning_matrices() {
     let (bytes, _) = reshaped(&model, Joints::Follow);
     let (before, after) = (player(&model), player(&read(&bytes)));
     // The palettes contain the skinning matrix `G B` of each joint.
-    let [old, new] = [&before, &after].map(|player| player.at(None, 0.0, &[]).palette);
+    let [old, new] = [&before, &after].map(|player| player.pose_at(None, 0.0, &[]).palette);
     for (a, b) in old.iter().zip(&new) {
         assert!(a.abs_diff_eq(*b, ROUNDING_TOLERANCE), "{a} {b}");
     }
@@ -458,7 +458,7 @@ fn many_morph_ends_are_interpolated_in_a_lattice() {
     // squared cell size.
     let diagonal = {
         let all = model.extra_points().unwrap();
-        let bounds = cagework_core::Bounds::of(&[&model.positions[..], &all].concat()).unwrap();
+        let bounds = cagework_core::Bounds::around(&[&model.positions[..], &all].concat()).unwrap();
         bounds.diagonal() as f64
     };
     let cell = report.lattice_cell * diagonal;

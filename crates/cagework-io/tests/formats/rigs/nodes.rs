@@ -180,7 +180,7 @@ fn feet_stay_attached_to_legs_in_clips() {
     let bytes = moved_by(&model, Joints::Follow, taller);
     let [before, after] = [player(&model), player(&read(&bytes))];
     for (clip, seconds) in [(0, 0.0), (0, 0.5), (0, 1.0), (1, 0.0)] {
-        let [old, new] = [&before, &after].map(|player| player.at(Some(clip), seconds, &[]).origins);
+        let [old, new] = [&before, &after].map(|player| player.pose_at(Some(clip), seconds, &[]).origins);
         assert!(old[2].distance(old[3]) <= ROUNDING_TOLERANCE);
         let gap = new[2].distance(new[3]);
         assert!(gap <= ROUNDING_TOLERANCE, "clip {clip} at {seconds} s: {gap} between shin and foot");
@@ -192,7 +192,7 @@ fn feet_stay_attached_to_legs_in_clips() {
     let options = ReshapeOptions { keep_travel: true, ..ReshapeOptions::default() };
     let by: Vec<DVec3> = by(&model);
     let kept = player(&read(&model.write_reshaped(&by, &[], &[], &options).unwrap().0));
-    let way = |seconds| kept.at(Some(0), seconds, &[]).origins[1];
+    let way = |seconds| kept.pose_at(Some(0), seconds, &[]).origins[1];
     assert!((way(1.0) - way(0.0)).distance(vec3(0.0, 0.2, 0.4)) <= ROUNDING_TOLERANCE);
 }
 
@@ -220,7 +220,7 @@ fn constant_translations_of_top_nodes_are_positions() {
             let by: Vec<DVec3> = points.map(|&p| moved(p).as_dvec3() - p.as_dvec3()).collect();
             let options = ReshapeOptions::default();
             let (bytes, _) = model.write_reshaped(&by, &outside, &[], &options).unwrap();
-            let origins = player(&read(&bytes)).at(Some(0), 0.5, &[]).origins;
+            let origins = player(&read(&bytes)).pose_at(Some(0), 0.5, &[]).origins;
             for (node, at) in [(1, vec3(0.0, 1.0, 0.0)), (3, vec3(0.5, 0.25, 0.0))] {
                 let expected = moved(at) + ratio * vec3(0.0, 0.0, 0.5);
                 assert!(
@@ -249,7 +249,7 @@ fn travel_of_a_root_that_stays_scales_with_the_skeleton() {
     for outside in [&outside[..], &[]] {
         let (bytes, _) = model.write_reshaped(&by, outside, &[], &ReshapeOptions::default()).unwrap();
         let travel = |model: &Model| {
-            let at = |seconds: f32| player(model).at(Some(0), seconds, &[]).origins[1];
+            let at = |seconds: f32| player(model).pose_at(Some(0), seconds, &[]).origins[1];
             at(0.5) - at(0.0)
         };
         let (before, after) = (travel(&model), travel(&read(&bytes)));
@@ -292,7 +292,7 @@ fn travel_of_turned_joints_turns_with_the_figure() {
         let bytes = model.write_reshaped(&by, &outside, &[], &options).unwrap().0;
         let after = model.player_of(&bytes).unwrap();
         if turn == tilt {
-            let at = |seconds| after.at(Some(0), seconds, &[]).origins[1];
+            let at = |seconds| after.pose_at(Some(0), seconds, &[]).origins[1];
             let (travel, way) = (at(1.0) - at(0.0), vec3(0.3, 0.0, 1.0));
             assert!(travel.normalize().distance(way.normalize()) < 1e-5, "tilted, node {travels}: {travel}");
             continue;
@@ -344,9 +344,9 @@ fn travel_of_clips_has_the_unit_of_the_model() {
     for scale in [0.01, 100.0] {
         let after = player(&read(&moved_by(&model, Joints::Follow, |p| scale * p)));
         for (clip, seconds) in [(0, 0.5), (0, 1.0), (1, 0.0)] {
-            let before = player(&model).at(Some(clip), seconds, &[]).origins;
+            let before = player(&model).pose_at(Some(clip), seconds, &[]).origins;
             let expected: Vec<Vec3> = before.iter().map(|&p| scale * p).collect();
-            let found = &after.at(Some(clip), seconds, &[]).origins;
+            let found = &after.pose_at(Some(clip), seconds, &[]).origins;
             assert_near(found, &expected, scale * ROUNDING_TOLERANCE, &format!("scale {scale}, clip {clip}"));
         }
     }
@@ -397,7 +397,7 @@ fn unevenly_scaled() -> Model {
 #[test]
 fn origins_of_turned_joints_with_uneven_scales_follow_the_cage() {
     let model = unevenly_scaled();
-    let origins = |model: &Model| player(model).at(None, 0.0, &[]).origins;
+    let origins = |model: &Model| player(model).pose_at(None, 0.0, &[]).origins;
     for joints in [Joints::Follow, Joints::Turn] {
         let after = origins(&read(&reshaped(&model, joints).0));
         for node in [1, 2, 3, 5] {

@@ -88,7 +88,7 @@ fn joints_of_lengthened_arms_follow_the_arms() {
 /// Whether each triangle faces against its rest normal, transformed by the skinning matrix of its first corner, in each
 /// of eight frames of the first clip.
 fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
-    let at_rest = player.at(None, 0.0, &[]).palette;
+    let at_rest = player.pose_at(None, 0.0, &[]).palette;
     let rest = cagework_core::skin::skin_vertices(&player.skin, &at_rest, &[]);
     let blended = |palette: &[Mat4], v: u32| {
         let v = v as usize;
@@ -102,7 +102,7 @@ fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
     };
     (0..8)
         .flat_map(|frame| {
-            let palette = player.at(Some(0), 0.25 * frame as f32, &[]).palette;
+            let palette = player.pose_at(Some(0), 0.25 * frame as f32, &[]).palette;
             let at = cagework_core::skin::skin_vertices(&player.skin, &palette, &[]);
             let is_turned = |t: &[u32; 3]| {
                 let change = blended(&palette, t[0]) * blended(&at_rest, t[0]).inverse();
@@ -160,7 +160,7 @@ fn targets_inside_the_cage_flip_no_triangles() {
     assert!(report.morph_ends > 1000 && report.morph_ends_outside == 0, "{report:?}");
     let player = player(&shaped);
     let up = |weight| {
-        let posed = player.at(None, 0.0, &[weight]);
+        let posed = player.pose_at(None, 0.0, &[weight]);
         let at = cagework_core::skin::skin_vertices(&player.skin, &posed.palette, &posed.targets);
         triangles
             .iter()

@@ -44,7 +44,7 @@ fn origins(
     assert_eq!((report.joints_moved, report.joints), (3, 3));
     let of_clip = Model::read_with_clips("walk.glb", of_clip, &mut |_| None, u64::MAX).unwrap();
     [&clip, &of_clip, &read(&of_body)]
-        .map(|model| player(model).at(Some(0), seconds, &[]).origins[1..4].to_vec())
+        .map(|model| player(model).pose_at(Some(0), seconds, &[]).origins[1..4].to_vec())
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn bones_have_the_lengths_of_the_body_whatever_the_rest_pose() {
         let (of_clip, _) = clip.write_reshaped(&still, &[], &[], &options).unwrap();
         let (of_body, of_clip) = (read(&of_body), clips(of_clip));
         for seconds in [0.0, 0.3, 0.9] {
-            let origins = |model: &Model| player(model).at(Some(0), seconds, &[]).origins;
+            let origins = |model: &Model| player(model).pose_at(Some(0), seconds, &[]).origins;
             let (in_body, in_clip, before) = (origins(&of_body), origins(&of_clip), origins(&body));
             for &(a, b) in &bones {
                 let [expected, found, old] =
@@ -185,7 +185,7 @@ fn axes_of_bones_do_not_change_where_joints_move() {
     options.skeleton = Some(Arc::new(body.skeleton(&by(&body), &[], &options).unwrap()));
     let still = vec![DVec3::ZERO; clip.extra_points().unwrap().len()];
     let (of_clip, _) = clip.write_reshaped(&still, &[], &[], &options).unwrap();
-    let at_rest = |model: &Model| player(model).at(None, 0.0, &[]).origins[1..4].to_vec();
+    let at_rest = |model: &Model| player(model).pose_at(None, 0.0, &[]).origins[1..4].to_vec();
     assert_near(&at_rest(&clips(of_clip)), &at_rest(&read(&of_body)), ROUNDING_TOLERANCE, "at rest");
 }
 
@@ -227,7 +227,7 @@ fn lifts_have_the_unit_of_the_file_of_clips() {
     assert!((100.0 * of_report.lift - report.lift).abs() < 1e-6, "{of_report:?}");
     for seconds in [0.0, 0.3, 1.0] {
         let places = |model: &Model, scale: f32| -> Vec<Vec3> {
-            let origins = player(model).at(Some(0), seconds, &[]).origins;
+            let origins = player(model).pose_at(Some(0), seconds, &[]).origins;
             origins[1..4].iter().map(|&p| scale * p).collect()
         };
         let (found, expected) = (places(&read_clips(of_clips.clone()), 100.0), places(&read(&of_body), 1.0));
