@@ -1,6 +1,5 @@
 //! `cagework bind`: computes the weights of a mesh in a cage, a report, and the reconstructed rest pose.
 
-use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
 use cagework_core::bind::{Binding, weights_bytes};
@@ -47,7 +46,8 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     refuse_files_read(&outputs)?;
     let of_mesh = |e| CliError::job(&args.mesh, e);
     // Weights contain the points of the rig whatever the format of the output, because `deform` may write a GLB.
-    let job = Job::of_resolved(&model, ModelFormat::Gltf, ReshapeOptions::default(), args.shape_only);
+    let job = Job::from_resolved(&model, ModelFormat::Gltf, ReshapeOptions::default(), args.shape_only);
+    let job = job.map_err(of_mesh)?;
     let (points, extra_points) = job.all_points().map_err(of_mesh)?;
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
@@ -69,7 +69,8 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     if let Some(output) = &args.output {
         let restored = Restored { points: &points, binding: &binding, rest: controls.rest() };
-        let job = Job::of_resolved(&model, output.format, ReshapeOptions::default(), args.shape_only);
+        let job = Job::from_resolved(&model, output.format, ReshapeOptions::default(), args.shape_only);
+        let job = job.map_err(of_mesh)?;
         let deformed = job.deform(&restored, &Poses::Shape(Vec::new())).map_err(of_mesh)?;
         let written = job.write(deformed).map_err(|e| CliError::job(&output.path, e))?;
         write(&output.path, &written.bytes)?;
@@ -114,8 +115,8 @@ impl Follow for Restored<'_> {
         Ok(None)
     }
 
-    fn outside(&self) -> Vec<u32> {
-        self.binding.outside.iter().map(|o| o.vertex).collect()
+    fn outside(&self) -> Result<Vec<u32>, JobError> {
+        Ok(self.binding.outside.iter().map(|o| o.vertex).collect())
     }
 }
 
@@ -123,8 +124,8 @@ impl Follow for Restored<'_> {
 ///
 /// # Errors
 /// If the bind fails or is cancelled, or the memory limit is exceeded.
-pub(crate) fn bind_job<M: Borrow<Model>>(
-    job: &Job<M>,
+pub(crate) fn bind_job(
+    job: &Job<'_>,
     controls: Controls<'_>,
     poses: &Poses,
     options: &BindOptions,

@@ -42,6 +42,9 @@ pub(crate) enum CliError {
         name: String,
         source: CageError,
     },
+    /// Poses or their times do not match the job.
+    #[error(transparent)]
+    Job(#[from] JobError),
     /// The bind failed.
     #[error(transparent)]
     Bind(#[from] BindError),

@@ -41,18 +41,21 @@ pub(crate) struct LoadedCage {
 /// If the file cannot be read, has no faces, or needs more memory than the limit.
 pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let model = load_any(path, up, memory)?;
-    if let Some(splats) = model.splats() {
-        return Err(CliError::Mismatch {
-            message: format!(
-                "{}: has {} but no faces",
-                shown_path(path),
-                counted(splats.len(), "splat", "splats")
-            ),
-            hint: "`cagework deform` moves splats with a cage, without weights; this command takes meshes",
-        });
-    }
+    refuse_splats(&model, path)?;
     model.require_faces()?;
     Ok(model)
+}
+
+fn refuse_splats(model: &Model, path: &Path) -> Result<(), CliError> {
+    let Some(splats) = model.splats() else { return Ok(()) };
+    Err(CliError::Mismatch {
+        message: format!(
+            "{}: has {} but no faces",
+            shown_path(path),
+            counted(splats.len(), "splat", "splats")
+        ),
+        hint: "`cagework deform` moves splats with a cage, without weights; this command takes meshes",
+    })
 }
 
 /// Returns the faces of a model as a polygon mesh, without checking that it is a valid cage.
@@ -78,14 +81,18 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
     Ok(model)
 }
 
-/// Reads a model, or a glTF of clips without triangles.
+/// Reads a model with faces, or a glTF of clips without triangles.
 ///
 /// # Errors
-/// The errors of [`load_any`].
+/// The errors of [`load_model`].
 pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let mut beside = |relative: &str| read_beside(path, relative);
     let mut model = Model::read_with_clips(&path.display().to_string(), bytes, &mut beside, memory.bytes())?;
+    refuse_splats(&model, path)?;
+    if !model.positions.is_empty() {
+        model.require_faces()?;
+    }
     model.set_up(up);
     Ok(model)
 }

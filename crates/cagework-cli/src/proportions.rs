@@ -6,7 +6,7 @@ use std::path::Path;
 use cagework_core::deform::outside_in_words;
 use cagework_core::words::counted;
 use cagework_io::{ReshapeReport, shown};
-use cagework_job::{Job, Poses};
+use cagework_job::{Job, JobOptions, Poses};
 use cagework_pose::humanoid::{BoneJoint, BoneSource};
 use cagework_pose::proportions::{HumanoidCage, PRESETS, Preset, ProportionRange};
 use glam::Vec3;
@@ -66,8 +66,10 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
     refuse_files_read(&outputs)?;
     let mut options = args.rig.job_options(false);
     options.reshape.ground = true;
-    // Without an output, only the vertices are bound.
-    options.shape_only |= args.output.is_none();
+    if args.output.is_none() {
+        // Only the vertices are bound, for the pose of the cage.
+        options = JobOptions { shape_only: true, ..JobOptions::default() };
+    }
     let format = args.output.as_ref().map_or_else(|| model.format(), |output| output.format);
     let of_mesh = |e| CliError::job(mesh, e);
     let job = Job::new(&model, format, &options).map_err(of_mesh)?;

@@ -1,6 +1,6 @@
 //! Weights of the models in a cage, and what follows from them: deformed vertices, displacements and fields.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
 
 use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
@@ -226,18 +226,25 @@ pub(crate) struct ModelRows<'a> {
 pub(crate) struct MovedModel<'a> {
     all: BoundDocument<'a>,
     id: u32,
-    /// Rows of a model with a rig; `None` for other models, and before a bind.
-    rows: Option<ModelRows<'a>>,
+    /// Rows of the model, copied when they are first needed; `None` before a bind.
+    rows: OnceCell<Option<ModelRows<'a>>>,
     /// Vertices of all models that are exported instead of those in a pose. `[n_vertices]`
     shown: Option<Vec<Vec3>>,
 }
 
 impl<'a> MovedModel<'a> {
     /// `shown`: vertices of all models that are exported instead of those in a pose, such as a frame of a clip.
-    pub(crate) fn new(all: BoundDocument<'a>, id: u32, shown: Option<Vec<Vec3>>) -> Result<Self, BoundError> {
-        let is_rigged = all.document().models.get(id)?.model.is_rigged();
-        let rows = all.bound.filter(|_| is_rigged).map(|bound| all.rows(id, bound)).transpose()?;
-        Ok(Self { all, id, rows, shown })
+    pub(crate) fn new(all: BoundDocument<'a>, id: u32, shown: Option<Vec<Vec3>>) -> Self {
+        Self { all, id, rows: OnceCell::new(), shown }
+    }
+
+    fn rows(&self) -> Result<Option<&ModelRows<'a>>, BoundError> {
+        if self.rows.get().is_none() {
+            let rows = self.all.bound.map(|bound| self.all.rows(self.id, bound)).transpose()?;
+            // Cannot fail: the cell is empty.
+            let _ = self.rows.set(rows);
+        }
+        Ok(self.rows.get().and_then(Option::as_ref))
     }
 }
 
@@ -246,7 +253,7 @@ impl Follow for MovedModel<'_> {
 
     fn displacements(&self, model: &Model, pose: &[Vec3]) -> Result<Vec<DVec3>, BoundError> {
         let rest = self.all.rest();
-        match &self.rows {
+        match self.rows()? {
             Some(ModelRows { weights, frames, rig, .. }) if pose.len() == rest.len() => {
                 let mut by = displacements(weights, frames, rest, pose);
                 by.extend(displacements(rig, frames, rest, pose));
@@ -274,8 +281,8 @@ impl Follow for MovedModel<'_> {
         Ok(Some(lattice.pose(self.all.rest(), pose)))
     }
 
-    fn outside(&self) -> Vec<u32> {
-        self.rows.iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect()
+    fn outside(&self) -> Result<Vec<u32>, BoundError> {
+        Ok(self.rows()?.into_iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect())
     }
 }
 

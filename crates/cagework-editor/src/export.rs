@@ -40,7 +40,7 @@ impl BoundDocument<'_> {
         let pose = &self.document().pose;
         let job = match clip {
             Some(clip) if options.dynamic => {
-                self.job(id, ModelFormat::Gltf, ReshapeOptions::default(), true)?.of_clip(clip)
+                self.job(id, ModelFormat::Gltf, ReshapeOptions::default(), true)?.with_clip(clip)
             }
             _ => self.job(id, ModelFormat::Gltf, self.of_rig(pose, options)?, options.plain)?,
         };
@@ -72,9 +72,9 @@ impl BoundDocument<'_> {
         clips.set_up(models.up());
         clips.set_origin(models.origin());
         let job = self.job(body.id, ModelFormat::Gltf, options.clone(), false)?;
-        let skeleton = Some(Arc::new(job.skeleton(&MovedModel::new(*self, body.id, None)?, pose)?));
+        let skeleton = Some(Arc::new(job.skeleton(&MovedModel::new(*self, body.id, None), pose)?));
         let options = ReshapeOptions { skeleton, ..options };
-        let job = Job::of_resolved(&clips, ModelFormat::Gltf, options, false);
+        let job = Job::from_resolved(&clips, ModelFormat::Gltf, options, false)?;
         let nothing = BoundPoints::nothing(pose.to_vec());
         Ok(job.write(job.deform(&nothing, &Poses::Shape(pose.to_vec()))?)?.into())
     }
@@ -109,7 +109,7 @@ impl BoundDocument<'_> {
             all.map(|pose| NamedPose { name: pose.name.to_string(), positions: pose.positions.to_vec() });
         let poses = Poses::Targets { all: all.collect(), timeline };
         let job = self.job(id, ModelFormat::Gltf, options, request.plain)?;
-        Ok(job.write(job.deform(&MovedModel::new(*self, id, None)?, &poses)?)?.into())
+        Ok(job.write(job.deform(&MovedModel::new(*self, id, None), &poses)?)?.into())
     }
 
     /// Exports the weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
@@ -137,24 +137,16 @@ impl BoundDocument<'_> {
         format: ModelFormat,
         mut options: ReshapeOptions,
         plain: bool,
-    ) -> Result<Job<Arc<Model>>, BoundError> {
+    ) -> Result<Job<'static>, BoundError> {
         let member = self.document().models.get(id)?;
-        // `rigid` may name parts of other models.
-        let props = member.model.props()?;
-        options.rigid.retain(|name| props.contains(name));
         options.parts = member.parts()?;
-        Ok(Job::of_resolved(Arc::clone(&member.model), format, options, plain))
+        Ok(Job::from_resolved(Arc::clone(&member.model), format, options, plain)?)
     }
 
     /// Writes a model in the current pose.
-    fn posed(
-        &self,
-        id: u32,
-        job: &Job<Arc<Model>>,
-        shown: Option<Vec<Vec3>>,
-    ) -> Result<Exported, BoundError> {
+    fn posed(&self, id: u32, job: &Job<'_>, shown: Option<Vec<Vec3>>) -> Result<Exported, BoundError> {
         let pose = Poses::Shape(self.document().pose.to_vec());
-        Ok(job.write(job.deform(&MovedModel::new(*self, id, shown)?, &pose)?)?.into())
+        Ok(job.write(job.deform(&MovedModel::new(*self, id, shown), &pose)?)?.into())
     }
 
     /// Builds the options for exporting the rig of a model. With several models, joints with the same name get the same
@@ -205,7 +197,7 @@ impl BoundDocument<'_> {
             let free = ReshapeOptions { feet: Feet::Free, ..options.clone() };
             let job = self.job(member.id, ModelFormat::Gltf, free, request.plain)?;
             let of_rig = if job.keeps_rig() {
-                let moved = MovedModel::new(*self, member.id, None)?;
+                let moved = MovedModel::new(*self, member.id, None);
                 job.write(job.deform(&moved, &Poses::Shape(pose.to_vec()))?)?.rig
             } else {
                 None

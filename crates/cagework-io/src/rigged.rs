@@ -368,8 +368,18 @@ impl Model {
     /// [`WriteError`] if there is no such clip, the rig cannot be read, or positions and normals of the frames would
     /// exceed 512 MiB.
     pub fn frames(&self, clip: usize) -> Result<Vec<Vec<Vec3>>, WriteError> {
+        let n = self.n_frames(clip)?;
         let player = self.player()?.ok_or(WriteError::NoRig)?;
-        let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
+        Ok(self.frames_of(&player, clip, n).collect())
+    }
+
+    /// Number of frames that [`Self::frames`] returns.
+    ///
+    /// # Errors
+    /// [`WriteError`] if there is no such clip, or positions and normals of the frames would exceed 512 MiB.
+    pub fn n_frames(&self, clip: usize) -> Result<usize, WriteError> {
+        let clips = self.clips();
+        let found = clips.get(clip).ok_or(WriteError::NoClip(clip))?;
         // A clip of length 0 has one frame, because the times of keys must increase.
         let n = ((found.seconds * BAKED_FRAMES_PER_SECOND).ceil() as usize).min(MAX_BAKED_FRAMES - 1) + 1;
         // The position and the normal of a vertex take 24 bytes.
@@ -383,7 +393,7 @@ impl Model {
                 MAX_BAKED_BYTES >> 20
             )));
         }
-        Ok(self.frames_of(&player, clip, n).collect())
+        Ok(n)
     }
 
     /// Exports a clip without skeleton, as one morph target per frame. Used for motion that skinning cannot

@@ -1,6 +1,7 @@
 //! Errors of deforming a model file.
 
 use cagework_core::bind::BindError;
+use cagework_core::words::counted;
 use cagework_io::{MemoryError, ModelFormat, SelectError, TimelineError, WriteError};
 use thiserror::Error;
 
@@ -21,7 +22,7 @@ pub enum JobError {
     )]
     NoFeet,
     /// Expressions need a VRM.
-    #[error("expressions need a VRM to read and to write, but {}: write morph targets instead", if *reads_vrm { "the file to write is none" } else { "the model has no VRM data" })]
+    #[error("expressions need a VRM to read and to write, but {}: write morph targets instead", if *reads_vrm { "the output is not a VRM" } else { "the model has no VRM data" })]
     NoVrm {
         /// Whether the model is a VRM.
         reads_vrm: bool,
@@ -42,7 +43,7 @@ pub enum JobError {
         n: usize,
     },
     /// An option or a kind of model takes a single pose.
-    #[error("{what} takes one pose, but there are {n}: write one file per pose")]
+    #[error("{what} takes one pose as its shape, not {}: write one file per pose", counted(*n, "morph target", "morph targets"))]
     OnePose {
         /// Option or kind of model, with an article.
         what: &'static str,
@@ -100,7 +101,7 @@ pub enum JobError {
         expected: usize,
     },
     /// The points of another kind of model were bound.
-    #[error("nothing that this model needs was bound: bind the points of this job")]
+    #[error("the bound points belong to another kind of model: bind those that `Job::points` returns")]
     Unbound,
     /// Times of poses are out of range or out of order.
     #[error(transparent)]
@@ -112,7 +113,7 @@ pub enum JobError {
     #[error(transparent)]
     Bind(#[from] BindError),
     /// The deformed model and its morph targets do not fit into the memory limit.
-    #[error("with {targets} morph targets {source}")]
+    #[error("{}{source}", if *targets > 0 { format!("with {} ", counted(*targets, "morph target", "morph targets")) } else { String::new() })]
     Memory {
         /// Number of morph targets.
         targets: usize,

@@ -35,7 +35,10 @@ pub trait Follow {
     fn field(&self, pose: &[Vec3]) -> Result<Option<Field>, Self::Error>;
 
     /// Indices of the points outside the cage.
-    fn outside(&self) -> Vec<u32>;
+    ///
+    /// # Errors
+    /// If the points are not known.
+    fn outside(&self) -> Result<Vec<u32>, Self::Error>;
 }
 
 /// Points to bind to a cage.
@@ -49,7 +52,7 @@ pub struct JobPoints {
     pub(crate) lattice: Option<Lattice>,
 }
 
-/// BoundPoints points of a job, and the controls at rest.
+/// Bound points of a job, and the controls at rest.
 #[derive(Clone, Debug)]
 pub struct BoundPoints {
     rest: Vec<Vec3>,
@@ -68,16 +71,10 @@ enum BoundBy {
 }
 
 impl JobPoints {
-    /// Points of the rig that are bound with the vertices. `[n_extra_points]`, object units
-    #[must_use]
-    pub fn extra_points(&self) -> &[Vec3] {
-        &self.positions[self.positions.len() - self.options.extra_points..]
-    }
-
     /// Combines the points with the result of binding [`Self::positions`] to `controls`.
     ///
     /// # Panics
-    /// If other points were bound.
+    /// If the number of bound nodes of a lattice differs.
     #[must_use]
     pub fn bound<'a>(self, binding: Binding, controls: impl Into<Controls<'a>>) -> BoundPoints {
         let rest = controls.into().rest().to_vec();
@@ -93,7 +90,7 @@ impl JobPoints {
 impl BoundPoints {
     /// Weights that were read from a file. `rest`: positions of the controls at rest. `[n_controls]`, object units
     #[must_use]
-    pub fn of_saved(saved: SavedWeights, rest: Vec<Vec3>) -> Self {
+    pub fn from_saved(saved: SavedWeights, rest: Vec<Vec3>) -> Self {
         let SavedWeights { weights, frames, outside, .. } = saved;
         Self { rest, by: BoundBy::Points { weights, frames, outside } }
     }
@@ -143,10 +140,10 @@ impl Follow for BoundPoints {
         }
     }
 
-    fn outside(&self) -> Vec<u32> {
+    fn outside(&self) -> Result<Vec<u32>, JobError> {
         match &self.by {
-            BoundBy::Points { outside, .. } => outside.iter().map(|o| o.vertex).collect(),
-            BoundBy::Lattice(_) | BoundBy::Nothing => Vec::new(),
+            BoundBy::Points { outside, .. } => Ok(outside.iter().map(|o| o.vertex).collect()),
+            BoundBy::Lattice(_) | BoundBy::Nothing => Ok(Vec::new()),
         }
     }
 }

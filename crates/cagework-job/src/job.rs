@@ -1,6 +1,6 @@
 //! A job: what one model needs to be deformed and written.
 
-use std::borrow::Borrow;
+use std::sync::Arc;
 
 use cagework_core::bind::{BindError, weights_bytes};
 use cagework_core::field::{CELLS, CLIP_CELLS, Field, Lattice, bend_vertices};
@@ -31,15 +31,42 @@ enum Kind {
     Frames(usize),
 }
 
-/// The deformation of one model, and the format in which it is written. The model can be owned, borrowed or shared.
+/// The model of a job, borrowed or shared.
 #[derive(Clone, Debug)]
-pub struct Job<M> {
-    model: M,
+pub enum JobModel<'a> {
+    /// A model that outlives the job.
+    Borrowed(&'a Model),
+    /// A model that the job keeps alive.
+    Shared(Arc<Model>),
+}
+
+impl<'a> From<&'a Model> for JobModel<'a> {
+    fn from(model: &'a Model) -> Self {
+        Self::Borrowed(model)
+    }
+}
+
+impl From<Arc<Model>> for JobModel<'_> {
+    fn from(model: Arc<Model>) -> Self {
+        Self::Shared(model)
+    }
+}
+
+impl From<Model> for JobModel<'_> {
+    fn from(model: Model) -> Self {
+        Self::Shared(Arc::new(model))
+    }
+}
+
+/// The deformation of one model, and the format in which it is written.
+#[derive(Clone, Debug)]
+pub struct Job<'m> {
+    model: JobModel<'m>,
     format: ModelFormat,
     kind: Kind,
     options: ResolvedOptions,
     cells: u32,
-    for_many: bool,
+    ignores_unused: bool,
 }
 
 /// A deformed model that has not been written yet.
@@ -93,50 +120,67 @@ pub fn require_memory(
     if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
 }
 
-impl<M: Borrow<Model>> Job<M> {
+impl<'m> Job<'m> {
     /// Prepares the deformation of a model that is written as `format`.
     ///
     /// # Errors
     /// If the model lacks what an option needs, or its rig cannot be read.
-    pub fn new(model: M, format: ModelFormat, options: &JobOptions) -> Result<Self, JobError> {
-        let mut job = Self::of_resolved(model, format, ReshapeOptions::default(), options.shape_only);
+    pub fn new(
+        model: impl Into<JobModel<'m>>,
+        format: ModelFormat,
+        options: &JobOptions,
+    ) -> Result<Self, JobError> {
+        let mut job = Self::of_kind(model.into(), format, options.shape_only);
         if let Some(clip) = options.clip {
-            job = job.of_clip(clip);
+            job = job.with_clip(clip);
         }
-        let (kind, keeps_rig) = (job.kind, job.keeps_rig());
-        let model = job.model.borrow();
-        if !options.for_many {
-            if kind == Kind::Capture
-                && let Some(option) = options.given_for_meshes(false)
-            {
-                return Err(JobError::NeedsMesh { option });
-            }
-            if options.reshape.feet == Feet::Lock && !keeps_rig {
-                return Err(JobError::NoFeet);
-            }
-            if matches!(kind, Kind::Frames(_)) && format != ModelFormat::Gltf {
-                return Err(JobError::ClipFormat { format });
-            }
-            let reads_vrm = model.vrm().is_some();
-            if options.reshape.expressions && !(reads_vrm && format == ModelFormat::Gltf) {
-                return Err(JobError::NoVrm { reads_vrm });
-            }
+        if !options.ignores_unused {
+            job.require_effect(options)?;
         }
-        let resolved = match kind {
-            Kind::Capture => {
-                ResolvedOptions { reshape: options.reshape.clone(), ..ResolvedOptions::default() }
-            }
-            _ => options.resolve(model, keeps_rig)?,
+        job.options = match job.kind {
+            Kind::Capture => ResolvedOptions { reshape: options.reshape.clone(), ..job.options },
+            _ => options.resolve(job.model(), job.keeps_rig())?,
         };
         let cells = options.cells.unwrap_or(job.cells);
-        Ok(Self { options: resolved, cells, for_many: options.for_many, ..job })
+        Ok(Self { cells, ignores_unused: options.ignores_unused, ..job })
+    }
+
+    /// Prepares a body whose skeleton other models share ([`Self::skeleton`]). Options that have no effect on it are
+    /// ignored, and so are parts that it lacks.
+    ///
+    /// # Errors
+    /// [`JobError::NoSkeleton`] if the model has none, or if its rig cannot be read.
+    pub fn of_body(model: impl Into<JobModel<'m>>, options: &JobOptions) -> Result<Self, JobError> {
+        let options = JobOptions { shape_only: false, clip: None, ignores_unused: true, ..options.clone() };
+        let job = Self::new(model, ModelFormat::Gltf, &options)?;
+        if job.kind == Kind::Rig { Ok(job) } else { Err(JobError::NoSkeleton) }
     }
 
     /// Prepares the deformation of a model whose parts are already selected. Options that have no effect on it are
-    /// ignored.
-    pub fn of_resolved(model: M, format: ModelFormat, options: ReshapeOptions, shape_only: bool) -> Self {
-        let own = model.borrow();
-        let kind = if own.positions.is_empty() {
+    /// ignored, such as names in `rigid` that no attachment of its skeleton has.
+    ///
+    /// # Errors
+    /// If its rig cannot be read.
+    pub fn from_resolved(
+        model: impl Into<JobModel<'m>>,
+        format: ModelFormat,
+        mut options: ReshapeOptions,
+        shape_only: bool,
+    ) -> Result<Self, JobError> {
+        let job = Self::of_kind(model.into(), format, shape_only);
+        if job.keeps_rig() && !options.rigid.is_empty() {
+            let props = job.model().props()?;
+            options.rigid.retain(|name| props.contains(name));
+        }
+        Ok(Self { options: ResolvedOptions { reshape: options, ..ResolvedOptions::default() }, ..job })
+    }
+
+    /// A job with default options.
+    fn of_kind(model: JobModel<'m>, format: ModelFormat, shape_only: bool) -> Self {
+        let options = ResolvedOptions::default();
+        let mut job = Self { model, format, kind: Kind::Mesh, options, cells: CELLS, ignores_unused: true };
+        let own = job.model();
+        job.kind = if own.positions.is_empty() {
             Kind::Clips
         } else if own.n_faces() == 0 {
             Kind::Capture
@@ -145,14 +189,32 @@ impl<M: Borrow<Model>> Job<M> {
         } else {
             Kind::Mesh
         };
-        let options = ResolvedOptions { reshape: options, ..ResolvedOptions::default() };
-        Self { model, format, kind, options, cells: CELLS, for_many: true }
+        job
+    }
+
+    /// Checks that every option has an effect on the model.
+    fn require_effect(&self, options: &JobOptions) -> Result<(), JobError> {
+        let of_mesh = options.first_for_parts().or_else(|| options.first_for_rigs());
+        if let (Kind::Capture, Some(option)) = (self.kind, of_mesh) {
+            return Err(JobError::NeedsMesh { option });
+        }
+        if let (Kind::Frames(_), true) = (self.kind, self.format != ModelFormat::Gltf) {
+            return Err(JobError::ClipFormat { format: self.format });
+        }
+        if options.reshape.feet == Feet::Lock && !self.keeps_rig() {
+            return Err(JobError::NoFeet);
+        }
+        let reads_vrm = self.model().vrm().is_some();
+        if options.reshape.expressions && !(reads_vrm && self.keeps_rig()) {
+            return Err(JobError::NoVrm { reads_vrm });
+        }
+        Ok(())
     }
 
     /// Deforms the frames of a clip, which become morph targets, instead of the model with its rig. Captures have no
     /// clips. `clip`: index of the clip.
     #[must_use]
-    pub fn of_clip(self, clip: usize) -> Self {
+    pub fn with_clip(self, clip: usize) -> Self {
         let kind = match self.kind {
             Kind::Mesh | Kind::Rig => Kind::Frames(clip),
             Kind::Clips | Kind::Capture | Kind::Frames(_) => self.kind,
@@ -162,7 +224,10 @@ impl<M: Borrow<Model>> Job<M> {
 
     /// The model.
     pub fn model(&self) -> &Model {
-        self.model.borrow()
+        match &self.model {
+            JobModel::Borrowed(model) => model,
+            JobModel::Shared(model) => model,
+        }
     }
 
     /// Format of the file to write.
@@ -181,7 +246,7 @@ impl<M: Borrow<Model>> Job<M> {
     }
 
     /// Whether the job deforms space instead of bound points, for splats, points and the frames of a clip.
-    pub fn follows_space(&self) -> bool {
+    pub fn uses_field(&self) -> bool {
         matches!(self.kind, Kind::Capture | Kind::Frames(_))
     }
 
@@ -217,7 +282,7 @@ impl<M: Borrow<Model>> Job<M> {
         self.check(poses)?;
         let controls = controls.into();
         let options = BindOptions { held: options.held + self.model().bytes(), ..*options };
-        let to_write = self.bytes_to_write(poses);
+        let to_write = self.bytes_to_write(poses)?;
         let cells = match self.kind {
             Kind::Clips => return Ok(None),
             Kind::Mesh | Kind::Rig => {
@@ -238,13 +303,23 @@ impl<M: Borrow<Model>> Job<M> {
     ///
     /// # Errors
     /// [`JobError::Memory`] if it cannot.
-    pub fn require_room(&self, poses: &Poses, weights_bytes: u64, limit: u64) -> Result<(), JobError> {
-        MemoryError::check(self.model().bytes() + weights_bytes + self.bytes_to_write(poses), limit)
+    pub fn check_memory_to_write(
+        &self,
+        poses: &Poses,
+        weights_bytes: u64,
+        limit: u64,
+    ) -> Result<(), JobError> {
+        let needed = self.model().bytes() + weights_bytes + self.bytes_to_write(poses)?;
+        MemoryError::check(needed, limit)
             .map_err(|source| JobError::Memory { targets: poses.n_targets(), source })
     }
 
-    fn bytes_to_write(&self, poses: &Poses) -> u64 {
-        self.model().bytes_to_write(self.format) + self.model().bytes_of_poses(poses.n_targets())
+    fn bytes_to_write(&self, poses: &Poses) -> Result<u64, JobError> {
+        let n_targets = match self.kind {
+            Kind::Frames(clip) => self.model().n_frames(clip)?,
+            Kind::Mesh | Kind::Rig | Kind::Clips | Kind::Capture => poses.n_targets(),
+        };
+        Ok(self.model().bytes_to_write(self.format) + self.model().bytes_of_poses(n_targets))
     }
 
     /// Checks that the model can take these poses in its format.
@@ -263,9 +338,9 @@ impl<M: Borrow<Model>> Job<M> {
             Kind::Mesh | Kind::Rig if !self.format.holds_poses() => {
                 Err(JobError::FormatPoses { format: self.format, n: all.len() })
             }
-            Kind::Mesh | Kind::Rig if self.for_many => Ok(()),
-            Kind::Mesh | Kind::Rig if *ground => one("a model on its ground"),
-            Kind::Mesh | Kind::Rig if *feet == Feet::Lock => one("a model with locked feet"),
+            Kind::Mesh | Kind::Rig if self.ignores_unused => Ok(()),
+            Kind::Mesh | Kind::Rig if *ground => one("the option ground"),
+            Kind::Mesh | Kind::Rig if *feet == Feet::Lock => one("the option feet = lock"),
             Kind::Mesh | Kind::Rig if skeleton.is_some() => one("a shared skeleton"),
             Kind::Mesh | Kind::Rig => Ok(()),
         }
@@ -281,12 +356,12 @@ impl<M: Borrow<Model>> Job<M> {
         let shape = match (self.kind, poses) {
             (Kind::Rig | Kind::Clips, Poses::Shape(pose)) => {
                 let by = follow.displacements(model, pose)?;
-                Shape::Rig { by, targets: Vec::new(), outside: follow.outside() }
+                Shape::Rig { by, targets: Vec::new(), outside: follow.outside()? }
             }
             (Kind::Rig | Kind::Clips, Poses::Targets { all, .. }) => {
                 let targets = named(all, |pose| follow.displacements(model, pose))?;
                 let by = vec![DVec3::ZERO; targets.first().map_or(0, |(_, by)| by.len())];
-                Shape::Rig { by, targets, outside: follow.outside() }
+                Shape::Rig { by, targets, outside: follow.outside()? }
             }
             (Kind::Mesh, Poses::Shape(pose)) => {
                 let mut vertices = follow.vertices(model, pose, &options.parts)?;
@@ -297,9 +372,9 @@ impl<M: Borrow<Model>> Job<M> {
                 let targets = named(all, |pose| follow.vertices(model, pose, &options.parts))?;
                 Shape::Mesh { vertices: model.positions.clone(), targets }
             }
-            (Kind::Capture | Kind::Frames(_), Poses::Shape(pose)) => Shape::Space(follow.field(pose)?),
-            // `check` refuses them.
-            (Kind::Capture | Kind::Frames(_), Poses::Targets { .. }) => return Err(JobError::Unbound.into()),
+            (Kind::Capture | Kind::Frames(_), poses) => {
+                Shape::Space(follow.field(poses.require_shape("space")?)?)
+            }
         };
         let timeline = poses.timeline().cloned();
         Ok(Deformed { shape, timeline })
@@ -308,13 +383,13 @@ impl<M: Borrow<Model>> Job<M> {
     /// Computes how the joints of the model move in a pose, for clothes and files of clips with the same joints.
     ///
     /// # Errors
-    /// [`JobError::NoSkeleton`] if the model has no rig, or if it cannot be read; those of `follow`.
+    /// [`JobError::NoSkeleton`] if the file keeps no rig, or if it cannot be read; those of `follow`.
     pub fn skeleton<F: Follow>(&self, follow: &F, pose: &[Vec3]) -> Result<Skeleton, F::Error> {
         if self.kind != Kind::Rig {
             return Err(JobError::NoSkeleton.into());
         }
         let by = follow.displacements(self.model(), pose)?;
-        let skeleton = self.model().skeleton(&by, &follow.outside(), &self.options.reshape);
+        let skeleton = self.model().skeleton(&by, &follow.outside()?, &self.options.reshape);
         Ok(skeleton.map_err(|e| self.of_write(e))?)
     }
 

@@ -8,6 +8,6 @@ mod poses;
 
 pub use error::JobError;
 pub use follow::{BoundPoints, Follow, JobPoints};
-pub use job::{Deformed, Job, Written, require_memory};
+pub use job::{Deformed, Job, JobModel, Written, require_memory};
 pub use options::JobOptions;
 pub use poses::{NamedPose, PoseTimes, Poses};

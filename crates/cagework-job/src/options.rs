@@ -21,7 +21,7 @@ pub struct JobOptions {
     pub cells: Option<u32>,
     /// Whether the same options apply to many models: parts that this model lacks are skipped, as are options that have
     /// no effect on it.
-    pub for_many: bool,
+    pub ignores_unused: bool,
 }
 
 /// Options of a rig with the parts of one model, and what the user should know about the names of these parts.
@@ -34,22 +34,26 @@ pub(crate) struct ResolvedOptions {
 }
 
 impl JobOptions {
-    /// Name of the first option that is set and applies to meshes only, or with `parts_only`, of the first that applies
-    /// to all meshes, with or without a skeleton. `None` if there is none.
+    /// Name of the first option that is set and changes the shape of parts or the height of a model; `None` if there is
+    /// none. Captures have no parts.
     #[must_use]
-    pub fn given_for_meshes(&self, parts_only: bool) -> Option<&'static str> {
-        let ReshapeOptions { joints, keep_travel, rigid, ground, feet, .. } = &self.reshape;
-        let given = [
-            ("ground", *ground),
-            ("rigid", !rigid.is_empty()),
-            ("mask", !self.mask.is_empty()),
-            ("joints", !parts_only && *joints != Joints::default()),
-            ("feet", !parts_only && *feet != Feet::default()),
-            ("keep-travel", !parts_only && *keep_travel),
-            ("static", !parts_only && self.shape_only),
-            ("expressions", !parts_only && self.reshape.expressions),
-        ];
-        given.iter().find_map(|(option, is_given)| is_given.then_some(*option))
+    pub fn first_for_parts(&self) -> Option<&'static str> {
+        let ReshapeOptions { rigid, ground, .. } = &self.reshape;
+        first(&[("ground", *ground), ("rigid", !rigid.is_empty()), ("mask", !self.mask.is_empty())])
+    }
+
+    /// Name of the first option that is set and applies to rigs; `None` if there is none.
+    #[must_use]
+    pub fn first_for_rigs(&self) -> Option<&'static str> {
+        let ReshapeOptions { joints, keep_travel, feet, expressions, skeleton, .. } = &self.reshape;
+        first(&[
+            ("joints", *joints != Joints::default()),
+            ("feet", *feet != Feet::default()),
+            ("keep-travel", *keep_travel),
+            ("static", self.shape_only),
+            ("expression", *expressions),
+            ("skeleton", skeleton.is_some()),
+        ])
     }
 
     /// Selects the named parts of a model. Parts that hang on joints are passed to the rig if the file keeps it. A name
@@ -62,7 +66,7 @@ impl JobOptions {
         let (mut missing, mut notices) = (Vec::new(), Vec::new());
         let mut find = |name: &String| -> Option<String> {
             match model.select(name) {
-                Err(SelectError::Unknown { .. }) if self.for_many => {
+                Err(SelectError::Unknown { .. }) if self.ignores_unused => {
                     missing.push(name.clone());
                     None
                 }
@@ -82,6 +86,10 @@ impl JobOptions {
             notices,
         })
     }
+}
+
+fn first(options: &[(&'static str, bool)]) -> Option<&'static str> {
+    options.iter().find_map(|(option, is_given)| is_given.then_some(*option))
 }
 
 /// Returns the first of several parts with the same name, and adds a notice about the others.

@@ -31,8 +31,8 @@ pub enum Poses {
 /// When an animation shows the morph targets. By default one per second.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PoseTimes {
-    /// Times that the user has given, one per pose; empty if none are given. Seconds
-    pub times: Vec<f32>,
+    /// Times that the user has given, one per pose. Seconds
+    pub times: Option<Vec<f32>>,
     /// Times of the keyframes that the poses are, one per pose; empty if they are not the keyframes of one clip. Seconds
     pub keys: Vec<f32>,
     /// Interpolation that the user has given.
@@ -47,7 +47,7 @@ impl Poses {
     pub fn shape(positions: Vec<Vec3>, times: &PoseTimes, expressions: bool) -> Result<Self, JobError> {
         let options = [
             ("expressions", expressions),
-            ("times", !times.times.is_empty()),
+            ("times", times.times.is_some()),
             ("interpolation", times.interpolation.is_some()),
         ];
         match options.into_iter().find(|(_, is_given)| *is_given) {
@@ -66,15 +66,14 @@ impl Poses {
         if n == 0 {
             return Err(JobError::NoPoses);
         }
-        if expressions && times.is_empty() && interpolation.is_none() {
+        if expressions && times.is_none() && interpolation.is_none() {
             return Ok(Self::Targets { all, timeline: None });
         }
-        let timeline = if times.is_empty() {
-            if keys.len() == n { Timeline::at_keys(keys) } else { Timeline::every_second(n) }
-        } else if times.len() == n {
-            Timeline::new(times, None)?
-        } else {
-            return Err(JobError::Times { given: times.len(), expected: n });
+        let timeline = match times {
+            Some(times) if times.len() == n => Timeline::new(times, None)?,
+            Some(times) => return Err(JobError::Times { given: times.len(), expected: n }),
+            None if keys.len() == n => Timeline::at_keys(keys),
+            None => Timeline::every_second(n),
         };
         Ok(Self::Targets { all, timeline: Some(timeline.with(interpolation.unwrap_or_default())) })
     }

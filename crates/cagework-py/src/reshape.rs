@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use cagework_core::progress::Progress;
 use cagework_core::{BindOptions, Controls, bind};
-use cagework_io::{Interpolation, Model, ModelFormat, ReshapeOptions};
+use cagework_io::{Model, ModelFormat, ReshapeOptions};
 use cagework_job::{BoundPoints, Job, JobOptions, NamedPose, PoseTimes, Poses};
 use glam::{DVec3, Vec3};
 use pyo3::exceptions::PyUserWarning;
@@ -31,15 +31,16 @@ struct Request {
 
 /// Deforms a model with its rig: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, ground=False, feet="free", rigid=(), mask=None, skeleton=None, expressions=False, times=None,
-/// interpolation="linear", static=False, **options) -> bytes
+/// interpolation=None, static=False, **options) -> bytes
 ///
 /// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object
 /// units; options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and
 /// textures; other formats are kept. Gaussian splats and point clouds follow the field of the cage. The bytes are identical to those that `cagework bind` and `cagework deform` write.
 ///
 /// posed may be a dict from names to poses: the model then stays at rest, and each pose becomes a morph target of a GLB
-/// with an animation that plays them, one per second or at times (seconds, ascending) with an interpolation ("step",
-/// "linear", "cubic"). expressions: make them expressions of a VRM, without an animation unless times are given.
+/// with an animation that plays them, one per second or at times (seconds, ascending), with an interpolation ("step",
+/// "linear", which is usual, or "cubic"). expressions: make them expressions of a VRM, without an animation unless times or
+/// interpolation is given.
 ///
 /// joints: "follow" moves them with the cage, "stay" leaves them, "turn" also rotates them; keep_travel: do not scale
 /// the travel distance of clips; ground: the lowest point at rest and in each clip keeps its height; feet: "lock" holds
@@ -55,7 +56,7 @@ struct Request {
 /// >>> data[:4]
 /// b'glTF'
 #[pyfunction]
-#[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, ground = false, feet = "free", rigid = Vec::new(), mask = None, skeleton = None, expressions = false, times = None, interpolation = "linear", r#static = false, **options))]
+#[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, ground = false, feet = "free", rigid = Vec::new(), mask = None, skeleton = None, expressions = false, times = None, interpolation = None, r#static = false, **options))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn reshape<'py>(
     py: Python<'py>,
@@ -71,7 +72,7 @@ pub(crate) fn reshape<'py>(
     skeleton: Option<&Bound<'py, PyAny>>,
     expressions: bool,
     times: Option<&Bound<'py, PyAny>>,
-    interpolation: &str,
+    interpolation: Option<&str>,
     r#static: bool,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
@@ -81,10 +82,9 @@ pub(crate) fn reshape<'py>(
     }
     let (bind_options, controls) = (bind_options(options)?, cage.get().controls());
     let origin = cage.get().origin();
-    let interpolation: Interpolation = word("interpolation", interpolation)?;
     let times = PoseTimes {
-        times: times.map(PyAnyMethods::extract).transpose()?.unwrap_or_default(),
-        interpolation: (interpolation != Interpolation::default()).then_some(interpolation),
+        times: times.map(PyAnyMethods::extract).transpose()?,
+        interpolation: interpolation.map(|name| word("interpolation", name)).transpose()?,
         ..PoseTimes::default()
     };
     let pose = |posed: &Bound<'py, PyAny>| -> PyResult<Vec<Vec3>> {
@@ -135,7 +135,7 @@ impl Request {
         options: &BindOptions,
         progress: &dyn Progress,
     ) -> PyResult<(Vec<u8>, Vec<String>)> {
-        let bind_job = |job: &Job<Model>, poses: &Poses| -> PyResult<BoundPoints> {
+        let bind_job = |job: &Job<'_>, poses: &Poses| -> PyResult<BoundPoints> {
             match job.points(controls, poses, options).map_err(error::job)? {
                 None => Ok(BoundPoints::nothing(controls.rest().to_vec())),
                 Some(points) => {
@@ -151,9 +151,7 @@ impl Request {
         };
         if let Some(body) = &self.skeleton {
             let pose = self.poses.require_shape("a shared skeleton").map_err(error::job)?;
-            // The parts that are named are those of the clothes, which the body may lack.
-            let options = JobOptions { for_many: true, ..self.options.clone() };
-            let job = Job::new(read(body, false)?, ModelFormat::Gltf, &options).map_err(error::job)?;
+            let job = Job::of_body(read(body, false)?, &self.options).map_err(error::job)?;
             let skeleton = job.skeleton(&bind_job(&job, &self.poses)?, pose).map_err(error::job)?;
             self.options.reshape.skeleton = Some(Arc::new(skeleton));
         }

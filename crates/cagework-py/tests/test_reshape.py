@@ -179,7 +179,7 @@ def test_one_cage_encloses_several_models(rigged):
 @pytest.mark.parametrize(
     ("posed", "options", "message"),
     [
-        ("dict", {"ground": True}, "on its ground takes one pose"),
+        ("dict", {"ground": True}, "the option ground takes one pose"),
         ("dict", {"times": [1.0, 2.0]}, r"times: expected one number per pose \(1\), got 2"),
         ("dict", {"times": [-1.0]}, "the time of pose 1 is -1 s"),
         ("dict", {"skeleton": rigged_glb()}, "a shared skeleton takes one pose"),

@@ -89,8 +89,16 @@ impl Binder {
                 points.bound(binding, &set)
             }
         };
+        job.part_notices().iter().for_each(|notice| warn(notice));
         Ok(job.write(job.deform(&bound, &poses)?)?.bytes)
     }
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// Writes a warning to the console of the browser or of Node.
+    #[wasm_bindgen(js_namespace = console)]
+    fn warn(text: &str);
 }
 
 /// What `proportions` of the npm package takes beside model and cage.

@@ -53,8 +53,8 @@ pub(crate) struct RigArgs {
 }
 
 impl RigArgs {
-    /// Returns the options of a job. `for_many`: whether they apply to many models.
-    pub(crate) fn job_options(&self, for_many: bool) -> JobOptions {
+    /// Returns the options of a job. `ignores_unused`: whether they apply to many models.
+    pub(crate) fn job_options(&self, ignores_unused: bool) -> JobOptions {
         let Self { joints, keep_travel, ground, feet, parts: PartArgs { rigid, mask }, shape_only } = self;
         let reshape = ReshapeOptions {
             joints: *joints,
@@ -64,7 +64,13 @@ impl RigArgs {
             feet: *feet,
             ..ReshapeOptions::default()
         };
-        JobOptions { reshape, mask: mask.clone(), shape_only: *shape_only, for_many, ..JobOptions::default() }
+        JobOptions {
+            reshape,
+            mask: mask.clone(),
+            shape_only: *shape_only,
+            ignores_unused,
+            ..JobOptions::default()
+        }
     }
 
     /// Whether `--joints stay` leaves the skeleton at rest.

@@ -51,7 +51,10 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 
 /// Writes the lattice of `--lattice`.
 fn lattice(args: &DeformArgs, path: &Path, model: &Model) -> Result<LatticeSummary, CliError> {
-    match args.rig.job_options(false).given_for_meshes(args.output.is_some()) {
+    let options = args.rig.job_options(false);
+    // Options of rigs apply to the model that is written beside the lattice.
+    let of_rig = options.first_for_rigs().filter(|_| args.output.is_none());
+    match options.first_for_parts().or(of_rig) {
         Some(option) => Err(CliError::Mismatch {
             message: format!(
                 "--{option}: this option changes a model, but a lattice stores how the space inside the cage moves"
@@ -72,7 +75,7 @@ fn deform(
     let (memory, of_output) = (args.read.memory, |e| CliError::job(&output.path, e));
     let job = Job::new(model, output.format, &job_options(args, model)?);
     let job = job.map_err(|e| CliError::job(&args.mesh, e))?;
-    check_inputs(args, job.follows_space())?;
+    check_inputs(args, job.uses_field())?;
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, model, memory, &controls)?;
     let saved = args.weights.as_deref().map(|path| load_weights(path, model, &cage.cage, memory));
@@ -84,12 +87,13 @@ fn deform(
     let (mut notices, mut subject) = (model.notices.clone(), subject(args, model, &cage, saved.as_ref()));
     let bound = match saved {
         Some(saved) => {
-            job.require_room(&poses, saved.weights.bytes() as u64, memory.bytes()).map_err(of_output)?;
+            job.check_memory_to_write(&poses, saved.weights.bytes() as u64, memory.bytes())
+                .map_err(of_output)?;
             let outside = saved.outside.iter().filter(|o| (o.vertex as usize) < model.positions.len());
             notices.extend(outside_in_words(outside, cage.cage.diagonal()));
             notices.extend(misfit_in_words(&saved, model, &cage.cage));
             let rest = rest_of(&cage.cage, &saved);
-            BoundPoints::of_saved(saved, rest)
+            BoundPoints::from_saved(saved, rest)
         }
         None => {
             let options = BindOptions { memory_limit: memory.bytes(), ..BindOptions::default() };
@@ -118,19 +122,23 @@ fn job_options(args: &DeformArgs, model: &Model) -> Result<JobOptions, CliError>
     Ok(options)
 }
 
-/// Checks that the arguments fit the kind of model. `follows_space`: whether it is deformed without weights.
-fn check_inputs(args: &DeformArgs, follows_space: bool) -> Result<(), CliError> {
+/// Checks that the arguments fit the kind of model. `uses_field`: whether it is deformed without weights.
+fn check_inputs(args: &DeformArgs, uses_field: bool) -> Result<(), CliError> {
     let (message, hint) = match &args.weights {
-        Some(_) if follows_space => {
+        Some(_) if uses_field => {
             ("the file has no faces, so it is deformed without weights", "leave out --weights")
         }
-        None if !follows_space => {
+        None if !uses_field => {
             ("the mesh can only be deformed with its weights", "give --weights, which `cagework bind` writes")
         }
-        _ if follows_space && !args.name.is_empty() => {
+        _ if uses_field && !args.name.is_empty() => {
             ("--name needs a mesh, but the model has no faces", "leave it out")
         }
-        _ if !follows_space && args.smooth > 0 && args.lattice.is_none() => (
+        _ if uses_field && !args.pose_controls.is_empty() => (
+            "splats, points and the frames of a clip do not take --pose-controls",
+            "`cagework map` takes controls inside the cage",
+        ),
+        _ if !uses_field && args.smooth > 0 && args.lattice.is_none() => (
             "--smooth applies to --dynamic, --lattice, splats and points only: weights contain their steps",
             "leave out --smooth",
         ),
@@ -160,7 +168,8 @@ fn load_poses(
     }
     let axes = (args.read.axis(), cage.origin());
     let mut positions = with_inner(positions, &args.pose_controls, inner, axes, args.read.memory)?;
-    let times = PoseTimes { times: args.times.clone(), keys, interpolation: args.interpolation };
+    let given = Some(args.times.clone()).filter(|times| !times.is_empty());
+    let times = PoseTimes { times: given, keys, interpolation: args.interpolation };
     let poses = if positions.len() == 1 && !args.expression {
         Poses::shape(positions.remove(0), &times, false)
     } else {
@@ -168,7 +177,7 @@ fn load_poses(
         let named = named.map(|(name, positions)| NamedPose { name, positions });
         Poses::targets(named.collect(), &times, args.expression)
     };
-    Ok((names, poses.map_err(|e| CliError::job(&args.pose[0], e))?))
+    Ok((names, poses?))
 }
 
 /// Describes what is deformed, without the counts that are known after writing.

@@ -14,7 +14,7 @@ use cagework_core::options::BindOptions;
 use cagework_core::progress::Cancellation;
 use cagework_core::{BindReport, Controls};
 use cagework_io::{Model, ModelFormat, Skeleton, shown, without_byte_order_mark};
-use cagework_job::{BoundPoints, Deformed, Job, JobOptions, Poses, require_memory};
+use cagework_job::{BoundPoints, Deformed, Job, Poses, require_memory};
 use glam::{DVec3, Vec3};
 
 use crate::args::{ModelOutput, RefitArgs};
@@ -54,7 +54,7 @@ struct Binder<'a> {
 /// A deformed model that is ready to be written.
 struct DeformedModel<'a> {
     refit: &'a Refit,
-    job: Job<Model>,
+    job: Job<'static>,
     deformed: Deformed,
     /// Report of the model. The total time and the report of its rig are added after writing.
     report: ModelReport,
@@ -261,9 +261,8 @@ impl Binder<'_> {
         if let Some(path) = &args.skeleton {
             let mut model = load_model(path, up, memory)?;
             model.set_origin(self.origin);
-            let options = JobOptions { shape_only: false, ..args.rig.job_options(true) };
             let wrong = |e| CliError::job(path, e);
-            let job = Job::new(model, ModelFormat::Gltf, &options).map_err(wrong)?;
+            let job = Job::of_body(model, &args.rig.job_options(true)).map_err(wrong)?;
             let (bound, _) = self.bind(&job, &Poses::Shape(pose.to_vec()), path)?;
             return Ok(Some(job.skeleton(&bound, pose).map_err(wrong)?));
         }
@@ -300,7 +299,7 @@ impl Binder<'_> {
     /// Binds what a job needs. Also returns the report of the bind; `None` if there is nothing to bind.
     fn bind(
         &self,
-        job: &Job<Model>,
+        job: &Job<'_>,
         poses: &Poses,
         path: &Path,
     ) -> Result<(BoundPoints, Option<BindReport>), CliError> {

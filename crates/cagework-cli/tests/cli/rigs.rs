@@ -166,7 +166,7 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
     sandbox
         .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
         .failure()
-        .stderr(contains("a clip that the cage bends takes one pose, but there are 2"));
+        .stderr(contains("a clip that the cage bends takes one pose as its shape, not 2 morph targets"));
     sandbox
         .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj -o bent.obj"))
         .failure()
@@ -372,11 +372,8 @@ fn ground_and_feet_are_options_of_one_pose() {
     let held = sandbox.json(&format!("{DEFORM} --pose wide.obj --feet lock -o out.glb --json"));
     assert_eq!(held["feet"][0], 2, "{held}");
     for (args, message) in [
-        ("--pose low.obj --pose wide.obj --ground", "a model on its ground takes one pose, but there are 2"),
-        (
-            "--pose low.obj --pose wide.obj --feet lock",
-            "a model with locked feet takes one pose, but there are 2",
-        ),
+        ("--pose low.obj --pose wide.obj --ground", "the option ground takes one pose as its shape"),
+        ("--pose low.obj --pose wide.obj --feet lock", "the option feet = lock takes one pose as its shape"),
     ] {
         sandbox.run(&format!("{DEFORM} {args} -o out.glb")).code(1).stderr(contains(message));
     }

@@ -60,7 +60,7 @@ fn splats_turn_with_the_cage_and_stay_far_outside() {
         sandbox.run(args).failure().stderr(contains(message));
     };
     refused(&format!("{deform} --weights a.npz"), "is deformed without weights");
-    refused(&format!("{deform} --pose box.obj"), "takes one pose, but there are 2");
+    refused(&format!("{deform} --pose box.obj"), "takes one pose as its shape, not 2 morph targets");
     refused("map a.splat --cage box.obj --pose box.obj -o b.splat", "leave their shapes");
     refused("bind a.splat --cage box.obj --weights a.npz", "a.splat: has 3,000 splats but no faces");
     refused("refit a.splat --cage box.obj --pose pose.obj -o out", "`cagework deform` moves splats");

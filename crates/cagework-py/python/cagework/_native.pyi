@@ -159,7 +159,7 @@ def reshape(
     skeleton: _Model | None = None,
     expressions: bool = False,
     times: Sequence[float] | None = None,
-    interpolation: Literal["step", "linear", "cubic"] = "linear",
+    interpolation: Literal["step", "linear", "cubic"] | None = None,
     static: bool = False,
     **options: Unpack[BindOptions],
 ) -> bytes: ...

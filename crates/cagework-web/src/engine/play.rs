@@ -106,7 +106,7 @@ impl Engine {
         let found = self.posed(|state| {
             let models = state.models();
             let at = state.posed_models().surface_at(state.pointer(x, y));
-            let place = at.and_then(|at| at.at(models, models.positions()));
+            let place = at.and_then(|at| at.position(models, models.positions()));
             let across = [state.camera.right(), state.camera.up()];
             let field = state.bound_document().field_of_splats();
             let of = |(splats, place)| outlines(splats, field.as_ref(), place, across);

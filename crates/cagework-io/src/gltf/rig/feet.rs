@@ -81,13 +81,13 @@ pub(super) struct Contacts {
 type Leg = [usize; 3];
 
 /// Nodes of a document, their parents, and its clips.
-struct Skeleton {
+struct AnimatedNodes {
     tree: NodeTree,
     parents: Vec<Option<usize>>,
     clips: Vec<Clip>,
 }
 
-impl Skeleton {
+impl AnimatedNodes {
     fn new(document: &GltfDocument) -> Result<Self, WriteError> {
         let tree = NodeTree::new(document)?;
         Ok(Self { parents: tree.parents(), tree, clips: clips(document) })
@@ -104,7 +104,7 @@ fn length(pose: &PosedNodes, [thigh, shin, foot]: Leg) -> f64 {
 
 /// Finds the legs of a document: those that a VRM names, otherwise chains of two joints above a joint named like a
 /// foot, or like a hand if it is near the ground.
-fn legs(document: &GltfDocument, skeleton: &Skeleton, up: DVec3) -> Vec<Leg> {
+fn legs(document: &GltfDocument, skeleton: &AnimatedNodes, up: DVec3) -> Vec<Leg> {
     let json = &document.json;
     let bones = vrm_bones(document);
     let bone = |name: &str| bones.iter().find(|(bone, _)| *bone == name).map(|(_, node)| *node);
@@ -166,7 +166,7 @@ pub(super) fn lock(
     after: GltfDocument,
     up: DVec3,
 ) -> Result<(GltfDocument, Contacts), WriteError> {
-    let (old, new) = (Skeleton::new(before)?, Skeleton::new(&after)?);
+    let (old, new) = (AnimatedNodes::new(before)?, AnimatedNodes::new(&after)?);
     let legs = legs(before, &old, up);
     let mut contacts = Contacts { legs: legs.len(), ..Contacts::default() };
     let mut edit = Edit::new(&after);
@@ -178,7 +178,7 @@ pub(super) fn lock(
         let rest = old.tree.posed([]);
         let lengths: Vec<f64> = legs.iter().map(|&leg| length(&rest, leg)).collect();
         // Keep only the ankles' paths. The poses of all samples can take gigabytes, so they are evaluated again below.
-        let paths = |of: &Skeleton, clip: &Clip| -> Vec<Vec<DVec3>> {
+        let paths = |of: &AnimatedNodes, clip: &Clip| -> Vec<Vec<DVec3>> {
             let mut paths = vec![Vec::with_capacity(times.len()); legs.len()];
             for &t in &times {
                 let pose = of.at(clip, t);
@@ -353,7 +353,7 @@ fn spans(
 }
 
 /// Whether the last pose of the legs in a clip equals the first one, except for a translation along the ground.
-fn is_loop(skeleton: &Skeleton, clip: &Clip, legs: &[Leg], lengths: &[f64], up: DVec3) -> bool {
+fn is_loop(skeleton: &AnimatedNodes, clip: &Clip, legs: &[Leg], lengths: &[f64], up: DVec3) -> bool {
     let [first, last] = [0.0, f64::from(clip.seconds)].map(|t| skeleton.at(clip, t));
     let by = |node: usize| last.position(node) - first.position(node);
     let travel = legs.first().map_or(DVec3::ZERO, |leg| flat(by(leg[0]), up));
