@@ -21,7 +21,7 @@ use thiserror::Error;
 use crate::counts::Counts;
 use crate::gltf::{self, GltfDocument, GltfError};
 use crate::look::Look;
-use crate::obj::{self, ObjDocument, ObjError};
+use crate::obj::{self, ObjError, PolygonDocument};
 use crate::origin::{far_notice, relative};
 use crate::polygons::{Encoding, PolygonsError};
 use crate::shown::shown;
@@ -105,14 +105,14 @@ pub struct Model {
     /// formats use both.
     encoding: Encoding,
     has_normals: bool,
-    /// The document that the model was read from; for a capture, an OBJ document without faces.
+    /// The document that the model was read from; for a capture, a polygon document without faces.
     pub(crate) document: Document,
     pub(crate) capture: Option<Arc<Capture>>,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) enum Document {
-    Obj(Box<ObjDocument>),
+    Polygons(Box<PolygonDocument>),
     Gltf(Box<GltfDocument>),
 }
 
@@ -313,7 +313,9 @@ impl Model {
         let bounds = Bounds::around(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
         let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
         let color = |(k, &p): (u32, &Vec3)| match &self.document {
-            Document::Obj(document) if document.colors.contains_key(&k) => Vec3::from(document.colors[&k]),
+            Document::Polygons(document) if document.colors.contains_key(&k) => {
+                Vec3::from(document.colors[&k])
+            }
             _ => 0.3 + 0.6 * (p - bounds.min) / size,
         };
         (0..).zip(&self.positions).map(color).collect()
@@ -328,7 +330,7 @@ impl Model {
     #[must_use]
     pub fn look(&self) -> Look {
         match &self.document {
-            Document::Obj(document) => obj::look(document, &self.positions),
+            Document::Polygons(document) => obj::look(document, &self.positions),
             Document::Gltf(document) => gltf::look(document, &self.positions, &self.triangles),
         }
     }
@@ -343,7 +345,7 @@ impl Model {
     #[must_use]
     pub fn n_faces(&self) -> usize {
         match &self.document {
-            Document::Obj(document) => document.face_materials.len(),
+            Document::Polygons(document) => document.face_materials.len(),
             Document::Gltf(_) => self.triangles.len(),
         }
     }

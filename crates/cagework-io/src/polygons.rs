@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::memory::{MemoryError, WELD_BYTES};
-use crate::obj::{Corner, Group, Line, MAX_FACE_CORNERS, Material, NONE, ObjDocument, shown_token};
+use crate::obj::{Corner, Group, Line, MAX_FACE_CORNERS, Material, NONE, PolygonDocument, shown_token};
 use crate::origin::{origin_near, relative};
 
 /// Error of reading a PLY, STL, OFF or 3MF file.
@@ -172,7 +172,7 @@ impl Polygons {
     ///
     /// # Errors
     /// If the polygons have no vertices, or a vertex is not finite.
-    pub(crate) fn document(&mut self) -> Result<ObjDocument, PolygonsError> {
+    pub(crate) fn document(&mut self) -> Result<PolygonDocument, PolygonsError> {
         if self.positions.is_empty() {
             return Err(PolygonsError::Empty);
         }
@@ -190,7 +190,7 @@ impl Polygons {
                 "normals of points are not kept: without faces, they cannot be computed again".to_owned(),
             );
         }
-        let mut document = ObjDocument {
+        let mut document = PolygonDocument {
             corners: std::mem::take(&mut self.corners)
                 .into_iter()
                 .map(|v| Corner { v, vt: NONE, vn: NONE })
@@ -205,7 +205,7 @@ impl Polygons {
             face_starts: std::mem::take(&mut self.face_starts),
             groups: std::mem::take(&mut self.groups),
             colors: (0..).zip(self.colors.iter().copied()).collect::<HashMap<_, _>>(),
-            ..ObjDocument::default()
+            ..PolygonDocument::default()
         };
         document.triangulate(&self.positions);
         Ok(document)
@@ -219,7 +219,7 @@ pub(crate) struct Shape<'a> {
     pub(crate) origin: DVec3,
     pub(crate) triangles: &'a [[u32; 3]],
     /// Source of polygons, colours and groups. `None` for a glTF, whose triangles become the faces.
-    pub(crate) document: Option<&'a ObjDocument>,
+    pub(crate) document: Option<&'a PolygonDocument>,
     pub(crate) has_normals: bool,
     pub(crate) encoding: Encoding,
 }

@@ -83,7 +83,7 @@ pub fn write_project(
     // A model in another format is stored beside a GLB built from it, which viewers can show.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
-        Document::Obj(_) if model.n_faces() == 0 => {
+        Document::Polygons(_) if model.n_faces() == 0 => {
             let glb = match model.drawn_splats() {
                 // The GLB of a point cloud has a splat for each point.
                 Some(Cow::Owned(points)) => {
@@ -98,7 +98,7 @@ pub fn write_project(
                 gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, (Some(model.origin), false))?.document;
             (&built, Some(file_of(model)?))
         }
-        Document::Obj(document) => {
+        Document::Polygons(document) => {
             let (glb, _) =
                 gltf::build_from_obj(&model.name, document, &model.positions_in_file(), model.origin)?;
             built =
@@ -233,7 +233,7 @@ fn file_of(model: &Model) -> Result<Cow<'_, [u8]>, WriteError> {
             gltf::embed_images(document, &mut json, &mut pack);
             Ok(pack.finish(json)?.into())
         }
-        (Document::Obj(document), ModelFormat::Obj | ModelFormat::ThreeMf) => {
+        (Document::Polygons(document), ModelFormat::Obj | ModelFormat::ThreeMf) => {
             Ok(document.bytes.as_slice().into())
         }
         // Documents of PLY, STL and OFF do not keep the bytes of their file: write it again.

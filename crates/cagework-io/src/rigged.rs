@@ -150,7 +150,7 @@ impl Model {
     pub fn player(&self) -> Result<Option<Player>, WriteError> {
         match &self.document {
             Document::Gltf(document) => Ok(Some(Player::new(document, document, self.origin)?)),
-            Document::Obj(_) => Ok(None),
+            Document::Polygons(_) => Ok(None),
         }
     }
 
@@ -169,7 +169,7 @@ impl Model {
     pub fn vrm(&self) -> Option<Vrm> {
         match &self.document {
             Document::Gltf(document) => gltf::vrm(document),
-            Document::Obj(_) => None,
+            Document::Polygons(_) => None,
         }
     }
 
@@ -178,7 +178,7 @@ impl Model {
     pub fn clips(&self) -> Vec<Clip> {
         match &self.document {
             Document::Gltf(document) => gltf::clips(document),
-            Document::Obj(_) => Vec::new(),
+            Document::Polygons(_) => Vec::new(),
         }
     }
 
@@ -258,7 +258,7 @@ impl Model {
     pub fn joints_with_vertices(&self) -> Skeleton {
         match &self.document {
             Document::Gltf(document) => gltf::joints_with_vertices(document),
-            Document::Obj(_) => Skeleton::default(),
+            Document::Polygons(_) => Skeleton::default(),
         }
     }
 

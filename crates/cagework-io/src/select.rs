@@ -89,7 +89,7 @@ impl Model {
     #[must_use]
     pub fn part_names(&self) -> Vec<String> {
         let names = match &self.document {
-            Document::Obj(document) => document.part_names(),
+            Document::Polygons(document) => document.part_names(),
             Document::Gltf(document) => document.part_names(),
         };
         names.into_iter().map(|(kind, name)| format!("{}:{name}", kind.word())).collect()
@@ -120,7 +120,7 @@ impl Model {
 
     fn vertices_of(&self, kind: PartKind, name: &str) -> Result<Vec<u32>, GltfError> {
         let mut vertices = match &self.document {
-            Document::Obj(document) => document.vertices_of(kind, name),
+            Document::Polygons(document) => document.vertices_of(kind, name),
             Document::Gltf(document) => document.vertices_of(kind, name)?,
         };
         vertices.sort_unstable();

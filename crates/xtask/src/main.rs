@@ -9,7 +9,6 @@ mod licences;
 mod npm;
 mod package;
 mod parts;
-mod prose;
 mod python;
 mod site;
 mod tasks;
@@ -26,7 +25,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   test           what a change needs: the Rust and TypeScript tests, and one story per step of the page in Chromium
   test-all       also the other tests of the page, Firefox, the packages, the glTF validator, damaged files
   test-long      the Blender extension, the notebooks, the evaluation, and damaged files for an hour
-  check          format, lints, documentation, dependency arrows, import circles, phrases in prose, types, biome
+  check          format, lints, documentation, dependency arrows, import circles, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   check-and-build  `check` during the build of the tests, with the compiler that `.ci/run` sets

@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::command::{root, run};
 use crate::npm::{self, exec};
 use crate::parts::{self, part};
-use crate::{arrows, deny, licences, package, prose, python, site, wasm};
+use crate::{arrows, deny, licences, package, python, site, wasm};
 
 /// Builds the `cagework` command in release mode and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -167,10 +167,9 @@ fn check_rust() -> Result<(), String> {
     check_files()
 }
 
-/// Checks dependencies, prose, versions and packaging, without compiling anything.
+/// Checks dependencies, versions and packaging, without compiling anything.
 fn check_files() -> Result<(), String> {
     arrows::check()?;
-    prose::check()?;
     deny::check()?;
     one_version()?;
     // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::accessor::MAX_ELEMENTS;
 use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
-use crate::obj::{NONE, ObjDocument};
+use crate::obj::{NONE, PolygonDocument};
 use crate::origin::translation;
 use crate::siblings::Image;
 
@@ -24,7 +24,7 @@ use crate::siblings::Image;
 /// colours and textures of materials, and vertex colours are preserved.
 pub(crate) fn build_from_obj(
     name: &str,
-    document: &ObjDocument,
+    document: &PolygonDocument,
     rest: &[Vec3],
     origin: DVec3,
 ) -> Result<(Vec<u8>, Vec<u32>), WriteError> {

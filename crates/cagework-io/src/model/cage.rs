@@ -34,7 +34,7 @@ impl Model {
     #[must_use]
     pub fn cage_mesh(&self) -> PolygonMesh {
         match &self.document {
-            Document::Obj(document) => {
+            Document::Polygons(document) => {
                 PolygonMesh { positions: self.positions.clone(), faces: document.faces().collect() }
             }
             Document::Gltf(_) => {
@@ -104,7 +104,7 @@ impl Model {
             return Err(PoseError::Count { pose, given, cage, expected: first.len() });
         }
         let mut posed: Vec<Vec<u32>> = match &pose.document {
-            Document::Obj(document) => document.faces().collect(),
+            Document::Polygons(document) => document.faces().collect(),
             Document::Gltf(_) => pose.triangles.iter().map(|t| t.to_vec()).collect(),
         };
         if let Some(welded) = welded.filter(|_| is_unwelded) {
@@ -134,7 +134,7 @@ impl Model {
     #[must_use]
     pub fn posed_as_cage(&self, pose: &[Vec3]) -> Vec<Vec3> {
         match self.document {
-            Document::Obj(_) => pose.to_vec(),
+            Document::Polygons(_) => pose.to_vec(),
             Document::Gltf(_) => weld(&self.positions).unique_of.iter().map(|&u| pose[u as usize]).collect(),
         }
     }

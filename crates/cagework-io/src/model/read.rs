@@ -87,7 +87,7 @@ impl Source<'_, '_> {
             format: ModelFormat::Obj,
             encoding: Encoding::default(),
             has_normals: false,
-            document: Document::Obj(Box::new(model.document)),
+            document: Document::Polygons(Box::new(model.document)),
             capture: None,
         })
     }
@@ -130,7 +130,7 @@ impl Source<'_, '_> {
             format,
             encoding: Encoding::default(),
             has_normals: false,
-            document: Document::Obj(Box::default()),
+            document: Document::Polygons(Box::default()),
             capture: Some(Arc::new(Capture { splats, file, records: read.records })),
         }
     }
@@ -176,7 +176,7 @@ impl Source<'_, '_> {
             encoding: read.encoding,
             has_normals: read.has_normals,
             positions: read.positions,
-            document: Document::Obj(Box::new(document)),
+            document: Document::Polygons(Box::new(document)),
             capture: None,
         })
     }

@@ -17,7 +17,7 @@ use super::{Document, Model, ModelFormat, ReadError};
 use crate::counts::Counts;
 use crate::gltf::{GltfDocument, GltfParts};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, sniff_image};
-use crate::obj::{Group, Material, ObjDocument};
+use crate::obj::{Group, Material, PolygonDocument};
 use crate::polygons::Encoding;
 use crate::siblings::Image;
 use crate::up::UpAxis;
@@ -178,7 +178,7 @@ impl Model {
         store.push(&triangles);
         drop((positions, triangles));
         let document = match document {
-            Document::Obj(document) => store_obj(*document, store),
+            Document::Polygons(document) => store_obj(*document, store),
             Document::Gltf(document) => store_gltf(*document, store),
         };
         let n_shared = store.shared.len();
@@ -214,7 +214,7 @@ impl Model {
                     let image = image.map(|image| image_of(&image, &shared)).transpose()?;
                     document.looks.insert(name, Material { color, image });
                 }
-                Document::Obj(Box::new(document))
+                Document::Polygons(Box::new(document))
             }
             HeadDocument::Gltf(head_of_gltf) => {
                 Document::Gltf(Box::new(restore_gltf(&head_of_gltf, head.n_shared, from)?))
@@ -239,9 +239,9 @@ impl Model {
     }
 }
 
-fn store_obj(document: ObjDocument, store: &mut Store) -> HeadDocument {
-    let ObjDocument { bytes, texcoords, normals, corners, face_starts, .. } = document;
-    let ObjDocument { face_materials, face_smoothing, triangles, colors, .. } = document;
+fn store_obj(document: PolygonDocument, store: &mut Store) -> HeadDocument {
+    let PolygonDocument { bytes, texcoords, normals, corners, face_starts, .. } = document;
+    let PolygonDocument { face_materials, face_smoothing, triangles, colors, .. } = document;
     store.arrays.push(bytes);
     store.push(&texcoords);
     store.push(&normals);
@@ -261,8 +261,8 @@ fn store_obj(document: ObjDocument, store: &mut Store) -> HeadDocument {
     HeadDocument::Obj { materials: document.materials, groups: document.groups, looks }
 }
 
-fn restore_obj(from: &mut StoredArrays<'_>) -> Result<ObjDocument, RestoreError> {
-    let mut document = ObjDocument {
+fn restore_obj(from: &mut StoredArrays<'_>) -> Result<PolygonDocument, RestoreError> {
+    let mut document = PolygonDocument {
         bytes: from.bytes()?,
         texcoords: from.numbers()?,
         normals: from.numbers()?,
@@ -271,7 +271,7 @@ fn restore_obj(from: &mut StoredArrays<'_>) -> Result<ObjDocument, RestoreError>
         face_materials: from.numbers()?,
         face_smoothing: from.numbers()?,
         triangles: from.numbers()?,
-        ..ObjDocument::default()
+        ..PolygonDocument::default()
     };
     let (vertices, colors): (Vec<u32>, Vec<[f32; 3]>) = (from.numbers()?, from.numbers()?);
     document.colors = vertices.into_iter().zip(colors).collect();

@@ -131,7 +131,7 @@ impl Model {
         let is_same = self.format == format;
         let loses = |what| !is_same && !format.keeps(what);
         let (colors, texcoords, materials, names, rig) = match &self.document {
-            Document::Obj(document) => (
+            Document::Polygons(document) => (
                 !document.colors.is_empty() && loses(ModelProperty::Colors),
                 !document.texcoords.is_empty() && loses(ModelProperty::Texcoords),
                 !document.materials.is_empty() && loses(ModelProperty::Materials),
@@ -190,7 +190,7 @@ impl Model {
     /// object of a 3MF that is placed several times is copied if its placements take different shapes.
     #[must_use]
     pub fn copies_in(&self, format: ModelFormat, written: &[u8]) -> Option<String> {
-        let Document::Obj(document) = &self.document else { return None };
+        let Document::Polygons(document) = &self.document else { return None };
         if [self.format, format] != [ModelFormat::ThreeMf; 2] || *document.bytes == *written {
             return None;
         }
@@ -215,10 +215,10 @@ impl Model {
         self.check(positions)?;
         let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
         match &self.document {
-            Document::Obj(document) if self.format == ModelFormat::Obj => {
+            Document::Polygons(document) if self.format == ModelFormat::Obj => {
                 Ok(obj::patch(document, &rest, &positions, self.origin))
             }
-            Document::Obj(_) => {
+            Document::Polygons(_) => {
                 let faces = self.cage_mesh().faces;
                 Ok(obj::write_cage_obj(
                     &PolygonMesh { positions: positions.into_owned(), faces },
@@ -239,7 +239,7 @@ impl Model {
     pub(super) fn shape<'a>(&'a self, positions: &'a [Vec3]) -> Result<Shape<'a>, WriteError> {
         self.check(positions)?;
         let document = match &self.document {
-            Document::Obj(document) => Some(document.as_ref()),
+            Document::Polygons(document) => Some(document.as_ref()),
             Document::Gltf(_) => None,
         };
         Ok(Shape {
@@ -309,7 +309,7 @@ impl Model {
                 let rest = Rest { positions: &at_rest, origin: self.origin, triangles: &self.triangles };
                 return gltf::patch(document, rest, &base, &named(poses, &turned), clip);
             }
-            Document::Obj(document) => document,
+            Document::Polygons(document) => document,
         };
         // Build a GLB of the rest shape, then patch it like a glTF source. The name may be a path, which stays private.
         let stem = Path::new(&self.name).file_stem().and_then(OsStr::to_str).unwrap_or_default();

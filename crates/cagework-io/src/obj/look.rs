@@ -8,7 +8,7 @@ use cagework_core::color::linear_from_srgb;
 use cagework_core::words::counted;
 use glam::Vec3;
 
-use super::{NONE, ObjDocument};
+use super::{NONE, PolygonDocument};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex};
 use crate::normals::Shading;
 use crate::siblings::{Image, Resolve, SiblingError, Siblings};
@@ -153,7 +153,7 @@ pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
 
 /// Builds the appearance of a document, with one [`LookVertex`] per distinct pair of source vertex and texture
 /// coordinate.
-pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
+pub(crate) fn look(document: &PolygonDocument, positions: &[Vec3]) -> Look {
     let mut look = Look::default();
     let sources = sources(document, positions, &mut look.copies);
     let mut numbers: HashMap<(u32, u32), u32> = HashMap::new();
@@ -207,7 +207,7 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
 /// Finds the source vertex of each corner: its own vertex or, at a vertex where normals or smoothing groups separate
 /// several surfaces, a duplicate appended to `copies`. Corners without normal and smoothing group keep their vertex.
 /// `[n_corners]`
-fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
+fn sources(document: &PolygonDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
     if document.normals.is_empty() && document.face_smoothing.is_empty() {
         return vertices;

@@ -18,7 +18,7 @@ pub use inner::{read_inner_controls, write_inner_controls};
 pub(crate) use lex::{Line, lines, shown as shown_token, tokens};
 pub(crate) use look::{Material, look, named_files, rest_of};
 pub(crate) use read::{
-    Corner, Group, MAX_FACE_CORNERS, MAX_MATERIALS, NONE, ObjDocument, positions_near, read,
+    Corner, Group, MAX_FACE_CORNERS, MAX_MATERIALS, NONE, PolygonDocument, positions_near, read,
 };
 pub use write::write_cage_obj;
 pub(crate) use write::{ObjGroup, patch, write_new};

@@ -46,9 +46,9 @@ impl Group {
     }
 }
 
-/// The parts of an OBJ file that exports need.
+/// A polygon mesh with what exports need of its file: an OBJ, PLY, STL, OFF or 3MF. Of a capture, the points.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct ObjDocument {
+pub(crate) struct PolygonDocument {
     /// Bytes of the original file if it is an OBJ or a 3MF; otherwise empty.
     pub(crate) bytes: Vec<u8>,
     /// `vt` lines as written, v upwards.
@@ -75,7 +75,7 @@ pub(crate) struct ObjDocument {
     pub(crate) colors: HashMap<u32, [f32; 3]>,
 }
 
-impl ObjDocument {
+impl PolygonDocument {
     /// Vertices of each face.
     pub(crate) fn faces(&self) -> impl ExactSizeIterator<Item = Vec<u32>> {
         let corners = |ends: &[u32]| &self.corners[ends[0] as usize..ends[1] as usize];
@@ -145,7 +145,7 @@ impl ObjDocument {
 /// Result of reading an OBJ file.
 pub(crate) struct ObjModel {
     pub(crate) positions: Vec<Vec3>,
-    pub(crate) document: ObjDocument,
+    pub(crate) document: PolygonDocument,
     /// Total number of `o` and `g` lines.
     pub(crate) groups: usize,
     /// Approximate memory of the document, bytes.
@@ -158,7 +158,7 @@ struct Reader<'a> {
     /// Memory of the file's bytes: the size of the file, or twice the size if the document copies borrowed bytes.
     file_memory: u64,
     positions: Vec<Vec3>,
-    document: ObjDocument,
+    document: PolygonDocument,
     material_numbers: HashMap<&'a [u8], u32>,
     material: u32,
     /// Smoothing group of the following faces. 0, the default of the format, means none.
@@ -211,7 +211,7 @@ fn read_bytes(
         bytes,
         file_memory: copies * bytes.len() as u64,
         positions: Vec::new(),
-        document: ObjDocument { face_starts: vec![0], ..ObjDocument::default() },
+        document: PolygonDocument { face_starts: vec![0], ..PolygonDocument::default() },
         material_numbers: HashMap::new(),
         material: NONE,
         smoothing: 0,

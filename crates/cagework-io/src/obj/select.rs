@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::read::ObjDocument;
+use super::read::PolygonDocument;
 use crate::part_kind::PartKind;
 
-impl ObjDocument {
+impl PolygonDocument {
     /// Lists the distinct names of materials, objects and groups.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
         let materials = self.materials.iter().map(|name| (PartKind::Material, name.clone()));

@@ -7,7 +7,7 @@ use cagework_core::PolygonMesh;
 use glam::{DVec3, Vec3};
 
 use super::lex::{lines, tokens};
-use super::read::{MIN_CORNERS, NONE, ObjDocument};
+use super::read::{MIN_CORNERS, NONE, PolygonDocument};
 use crate::normals::Shading;
 use crate::origin::Coordinate;
 use crate::surface::{gradients, turned_normal};
@@ -33,7 +33,7 @@ impl Pairs {
     }
 }
 
-impl ObjDocument {
+impl PolygonDocument {
     /// Collects the pairs in the order of their first use. `rest`: positions of the vertices at rest.
     pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
         let mut numbers = HashMap::new();
@@ -63,7 +63,7 @@ impl ObjDocument {
 /// Corners that share a normal at rest may need different normals afterwards, so each `vn` line becomes one
 /// line per vertex that uses it. Normal indices of faces are rewritten only if this changes the numbering. A
 /// file without `vn` lines gets none.
-pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3], origin: DVec3) -> Vec<u8> {
+pub(crate) fn patch(document: &PolygonDocument, rest: &[Vec3], positions: &[Vec3], origin: DVec3) -> Vec<u8> {
     let normals = (!document.normals.is_empty()).then(|| PatchedNormals::new(document, rest, positions));
     let bytes = &document.bytes;
     let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
@@ -119,7 +119,7 @@ struct PatchedNormals {
 }
 
 impl PatchedNormals {
-    fn new(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -> Self {
+    fn new(document: &PolygonDocument, rest: &[Vec3], positions: &[Vec3]) -> Self {
         let pairs = document.pairs(rest);
         let new = pairs.normals(rest, positions);
         let mut users: Vec<Vec<u32>> = vec![Vec::new(); document.normals.len()];
