@@ -89,7 +89,7 @@ fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
     for first in (0..splats.len()).step_by(RUN) {
         let run = first..splats.len().min(first + RUN);
         let points: Vec<Vec3> = run.clone().flat_map(|s| points_of(splats, s, STEP * diagonal)).collect();
-        let binding = solved.bind(&points, (0, 0), &NoProgress).expect("the splats can be bound");
+        let binding = solved.bind(&points, 0, 0, &NoProgress).expect("the splats can be bound");
         for ((_, posed), (field, errors)) in poses.iter().zip(fields.iter().zip(&mut all)) {
             let moved = deform_bound(&binding.weights, &binding.frames, posed);
             for (splat, moved) in run.clone().zip(moved.chunks_exact(POINTS)) {

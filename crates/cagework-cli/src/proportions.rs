@@ -82,7 +82,7 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
     let cage = HumanoidCage::new(rest, loaded.rings(), &model.positions, &rig, &humanoid);
     let cage = cage.with_bind(&bound.weights, &model.positions, &rig, &humanoid);
     let pose = pose_of(args, &loaded, &cage)?;
-    let ranges = || cage.ranges((&bound.weights, &bound.frames), &model.positions, &model.triangles);
+    let ranges = || cage.ranges(&bound.weights, &bound.frames, &model.positions, &model.triangles);
     let mut summary = Summary {
         output: args.output.as_ref().map(|output| output.path.display().to_string()),
         pose: args.pose_out.as_ref().map(|output| output.path.display().to_string()),

@@ -292,8 +292,8 @@ fn a_sample_of_the_triangles_folds_where_the_model_does() {
         BoundDocument { editor: &editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
     let FoldSample { weights, frames, positions, triangles } = all.fold_sample().unwrap();
     assert!((7_000..=8_000).contains(&triangles.len()), "{} triangles", triangles.len());
-    let sampled = cage.ranges((&weights, &frames), &positions, &triangles);
+    let sampled = cage.ranges(&weights, &frames, &positions, &triangles);
     let models = &document.models;
-    let exact = cage.ranges((&bound.weights, &bound.frames), models.positions(), models.triangles());
+    let exact = cage.ranges(&bound.weights, &bound.frames, models.positions(), models.triangles());
     assert_eq!(sampled, exact);
 }

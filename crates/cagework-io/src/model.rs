@@ -161,7 +161,8 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        Self::read_from(name, bytes.into(), resolve, memory_limit, (true, false))
+        let bytes = bytes.into();
+        Source { name, bytes, resolve, memory_limit, near: true, clips_alone: false }.read()
     }
 
     /// Like [`Self::read_within`], but also accepts a glTF that contains only clips, without triangles and vertices.
@@ -174,7 +175,8 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        Self::read_from(name, bytes.into(), resolve, memory_limit, (true, true))
+        let bytes = bytes.into();
+        Source { name, bytes, resolve, memory_limit, near: true, clips_alone: true }.read()
     }
 
     /// Makes a model from a generated mesh whose positions are relative to `origin`; same result as reading the mesh as
@@ -184,7 +186,7 @@ impl Model {
     /// [`ReadError`] if the mesh has no vertices.
     pub fn of_mesh(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Self, ReadError> {
         let text = obj::write_cage_obj(mesh, DVec3::ZERO);
-        let model = Self::read_from(name, text.into(), &mut |_| None, u64::MAX, (false, false))?;
+        let model = Source { bytes: text.into(), ..Source::of_made(name, &mut |_| None) }.read()?;
         Ok(Self { origin, ..model })
     }
 
@@ -199,26 +201,7 @@ impl Model {
         if splats.is_empty() {
             return Err(ReadError::Splats { name: name.into(), source: SplatError::Empty });
         }
-        let source = Source {
-            name,
-            bytes: Cow::default(),
-            resolve: &mut |_| None,
-            memory_limit: u64::MAX,
-            near: false,
-            clips_alone: false,
-        };
-        source.new_capture(splats, origin)
-    }
-
-    fn read_from(
-        name: &str,
-        bytes: Cow<'_, [u8]>,
-        resolve: &mut Resolve<'_>,
-        memory_limit: u64,
-        (near, clips_alone): (bool, bool),
-    ) -> Result<Self, ReadError> {
-        let format = ModelFormat::of_file(name, &bytes)?;
-        (format.facts().read)(Source { name, bytes, resolve, memory_limit, near, clips_alone })
+        Source::of_made(name, &mut |_| None).new_capture(splats, origin)
     }
 
     /// Approximate memory of the model and its document, bytes.

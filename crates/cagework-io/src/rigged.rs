@@ -9,8 +9,8 @@ use thiserror::Error;
 
 use crate::error::WriteError;
 use crate::gltf::{
-    self, Clip, Ground, JointPoint, Player, PoseClip, PoseDisplacements, ReshapeOptions, ReshapeReport, Rig,
-    Skeleton, Vrm,
+    self, Clip, Ground, JointPoint, Player, PointMoves, PoseClip, PoseDisplacements, ReshapeOptions,
+    ReshapeReport, Rig, Skeleton, Vrm,
 };
 use crate::model::{Document, Model};
 use crate::origin::relative;
@@ -160,7 +160,7 @@ impl Model {
     /// [`WriteError`] if this model is not a glTF, or `export` cannot be read.
     pub fn player_of(&self, export: &[u8]) -> Result<Player, WriteError> {
         let Document::Gltf(like) = &self.document else { return Err(WriteError::NoRig) };
-        let read = gltf::read("export.glb", export, &mut |_| None, u64::MAX, (Some(self.origin), false))?;
+        let read = gltf::read_written("export.glb", export, self.origin)?;
         Ok(Player::new(&read.document, like, self.origin)?)
     }
 
@@ -210,7 +210,8 @@ impl Model {
             .collect();
         let is_outside = self.all_outside(&rig, outside);
         let up = self.up.vector_turned_back(DVec3::Y);
-        gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
+        let moves = PointMoves { by: &by, is_outside: &is_outside };
+        gltf::reshape(document, &rig, &self.triangles, moves, &poses, options, up)
     }
 
     /// Returns the moves of the joints in [`Self::write_reshaped`], for other files with the same rig.
@@ -229,7 +230,8 @@ impl Model {
         let by = rig.held(&options.parts, &rest, self.all_moved(&rig, by)?);
         let is_outside = self.all_outside(&rig, outside);
         let up = self.up.vector_turned_back(DVec3::Y);
-        gltf::skeleton(document, &rig, &self.triangles, (&by, &is_outside), (options, up))
+        let moves = PointMoves { by: &by, is_outside: &is_outside };
+        gltf::skeleton(document, &rig, &self.triangles, moves, options, up)
     }
 
     /// Heights of the lowest vertex at rest and in `posed`, for a model that is written without its rig. `posed`:

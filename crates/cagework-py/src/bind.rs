@@ -98,7 +98,7 @@ pub(crate) fn bind_many<'py>(
         let held = |of: &[Vec3]| size_of_val(of) as u64;
         positions
             .iter()
-            .map(|of| solved.bind(of, (held(of), 0), progress))
+            .map(|of| solved.bind(of, held(of), 0, progress))
             .collect::<Result<Vec<_>, BindError>>()
     })?;
     all.map_err(error::bind)?.into_iter().map(|binding| weights_and_report(py, binding)).collect()

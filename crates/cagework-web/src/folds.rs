@@ -68,6 +68,6 @@ impl Binder {
             return Err(fault(&"the sample has other vertices than its weights"));
         }
         let cage = HumanoidCage::new(&rest, &sample.rings, &points(&sample.points.to_vec()), &rig, &humanoid);
-        Ok(object(&cage.ranges((&weights, &frames), &positions, triangles.as_chunks().0)))
+        Ok(object(&cage.ranges(&weights, &frames, &positions, triangles.as_chunks().0)))
     }
 }

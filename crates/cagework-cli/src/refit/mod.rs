@@ -317,7 +317,7 @@ impl Binder<'_> {
         }
         let BindOptions { held, extra_points, .. } = points.options;
         let binding = match self.solved.get() {
-            Some(Some(solved)) => solved.bind(&points.positions, (held, extra_points), &Bar::start())?,
+            Some(Some(solved)) => solved.bind(&points.positions, held, extra_points, &Bar::start())?,
             _ => bind_positions(&points.positions, self.controls, false, &points.options)?,
         };
         let with_fields = BindOptions { held: held + self.field_bytes(), ..points.options };

@@ -101,7 +101,8 @@ impl<'a> SolvedCage<'a> {
     pub fn bind(
         &self,
         positions: &[Vec3],
-        (held, extra_points): (u64, usize),
+        held: u64,
+        extra_points: usize,
         progress: &dyn Progress,
     ) -> Result<Binding, BindError> {
         let watch = Watch::new(progress);

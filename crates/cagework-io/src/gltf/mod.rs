@@ -59,7 +59,7 @@ pub use rig::{
     Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
 };
 pub(crate) use rig::{
-    PoseDisplacements, Rig, clips, reshape, rest_rig, skeleton, vrm, write_moved, write_targets,
+    PointMoves, PoseDisplacements, Rig, clips, reshape, rest_rig, skeleton, vrm, write_moved, write_targets,
 };
 pub(crate) use size::MAX_TRIANGLES;
 pub(crate) use splats::{LINEAR as LINEAR_SPLATS, write as write_splats};
@@ -374,7 +374,8 @@ pub(crate) fn read(
     bytes: &[u8],
     resolve: &mut Resolve<'_>,
     memory_limit: u64,
-    (origin, clips_alone): (Option<DVec3>, bool),
+    origin: Option<DVec3>,
+    clips_alone: bool,
 ) -> Result<GltfModel, GltfError> {
     let mut notices = Vec::new();
     let (mut document, worlds) = parse(name, bytes, resolve, memory_limit, &mut notices)?;
@@ -424,6 +425,11 @@ pub(crate) fn read(
         notices,
         splats: None,
     })
+}
+
+/// Reads a GLB that this crate has written. `origin`: point to which the positions are relative.
+pub(crate) fn read_written(name: &str, glb: &[u8], origin: DVec3) -> Result<GltfModel, GltfError> {
+    read(name, glb, &mut |_| None, u64::MAX, Some(origin), false)
 }
 
 /// Parses a file without reading its geometry. [`GltfDocument::bytes`] counts only the file and its buffers.

@@ -27,11 +27,27 @@ pub(super) struct Source<'a, 'b> {
     pub(super) clips_alone: bool,
 }
 
+impl<'a, 'b> Source<'a, 'b> {
+    /// An empty file for a mesh or capture that the program has made, with positions as given.
+    pub(super) fn of_made(name: &'a str, resolve: &'a mut Resolve<'b>) -> Self {
+        Self { name, bytes: Cow::default(), resolve, memory_limit: u64::MAX, near: false, clips_alone: false }
+    }
+}
+
 impl Source<'_, '_> {
+    /// Reads the file in its format.
+    ///
+    /// # Errors
+    /// If the format is not known, or the file is damaged or above a limit.
+    pub(super) fn read(self) -> Result<Model, ReadError> {
+        let format = ModelFormat::of_file(self.name, &self.bytes)?;
+        (format.facts().read)(self)
+    }
+
     pub(super) fn gltf(self) -> Result<Model, ReadError> {
         let origin = (!self.near).then_some(DVec3::ZERO);
-        let place = (origin, self.clips_alone);
-        let mut model = gltf::read(self.name, &self.bytes, self.resolve, self.memory_limit, place)
+        let (limit, clips_alone) = (self.memory_limit, self.clips_alone);
+        let mut model = gltf::read(self.name, &self.bytes, self.resolve, limit, origin, clips_alone)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
         if let Some((raw, color_space)) = model.splats.take() {
             if color_space == gltf::LINEAR_SPLATS {

@@ -314,7 +314,7 @@ impl Model {
         // Build a GLB of the rest shape, then patch it like a glTF source. The name may be a path, which stays private.
         let stem = Path::new(&self.name).file_stem().and_then(OsStr::to_str).unwrap_or_default();
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
-        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, (Some(self.origin), false))?;
+        let built = gltf::read_written(&self.name, &glb, self.origin)?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, origin: self.origin, triangles: &built.triangles };

@@ -500,7 +500,8 @@ impl HumanoidCage {
     #[must_use]
     pub fn ranges(
         &self,
-        (weights, frames): (&Weights, &Frames),
+        weights: &Weights,
+        frames: &Frames,
         positions: &[Vec3],
         triangles: &[[u32; 3]],
     ) -> Vec<ProportionRange> {

@@ -167,7 +167,7 @@ fn ranges_end_where_the_model_folds() {
         posed[0].y - posed[1].y
     };
     let positions = deform_bound(&weights, &frames, &figure.rest);
-    let ranges = figure.cage.ranges((&weights, &frames), &positions, &[[0, 1, 2]]);
+    let ranges = figure.cage.ranges(&weights, &frames, &positions, &[[0, 1, 2]]);
     let torso = ranges.iter().find(|range| range.proportion == Proportion::Torso).unwrap();
     let next = FACTORS_UP.into_iter().find(|factor| *factor > torso.max).unwrap();
     assert!(at(torso.max) > 0.0 && at(next) < 0.0, "{torso:?} {} {}", at(torso.max), at(next));

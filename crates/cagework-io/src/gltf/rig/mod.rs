@@ -55,7 +55,7 @@ pub use play::{Player, RigPose};
 pub(crate) use poses::PoseDisplacements;
 pub use report::ReshapeReport;
 pub use reshape::ReshapeOptions;
-pub(crate) use reshape::{reshape, skeleton, write_moved, write_targets};
+pub(crate) use reshape::{PointMoves, reshape, skeleton, write_moved, write_targets};
 pub(crate) use rest::rest_rig;
 pub use skeleton::Skeleton;
 pub(crate) use skeleton::joints_with_vertices;

@@ -60,19 +60,29 @@ pub struct ReshapeOptions {
     pub expressions: bool,
 }
 
-/// Writes the document with points displaced by `by`, and adds each of the `poses` as a morph target. With poses, `by`
-/// is zero, so that the document stays at rest.
+/// How the cage moves the points of a rig. `[n_points]` each
+#[derive(Clone, Copy)]
+pub(crate) struct PointMoves<'a> {
+    /// Displacements, world space as in the file.
+    pub(crate) by: &'a [DVec3],
+    /// Whether each point is outside the cage.
+    pub(crate) is_outside: &'a [bool],
+}
+
+/// Writes the document with points displaced by `moves`, and adds each of the `poses` as a morph target. With poses, the
+/// displacements are zero, so that the document stays at rest.
 ///
-/// `triangles`: of the model. `is_outside`: whether each point is outside the cage. The caller checks the lengths of
-/// the slices.
+/// `triangles`: of the model. The caller checks the lengths of the slices.
 pub(crate) fn reshape(
     document: &GltfDocument,
     rig: &Rig<'_>,
     triangles: &[[u32; 3]],
-    (by, is_outside): (&[DVec3], &[bool]),
+    moves: PointMoves<'_>,
     poses: &[PoseDisplacements<'_>],
-    (options, up): (&ReshapeOptions, DVec3),
+    options: &ReshapeOptions,
+    up: DVec3,
 ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
+    let PointMoves { by, is_outside } = moves;
     check_turn(document, options)?;
     let mut edit = Edit::new(document);
     let grounded;
@@ -214,7 +224,8 @@ pub(crate) fn write_moved(
     let by = poses::held(rig, (&[], &[]), by);
     let is_outside = vec![false; by.len()];
     let options = ReshapeOptions { joints: Joints::Stay, ..ReshapeOptions::default() };
-    Ok(reshape(document, rig, triangles, (&by, &is_outside), &[], (&options, DVec3::Y))?.0)
+    let moves = PointMoves { by: &by, is_outside: &is_outside };
+    Ok(reshape(document, rig, triangles, moves, &[], &options, DVec3::Y)?.0)
 }
 
 /// Writes the document with `poses`, whose displacements are those of the vertices, as morph targets without an animation.
@@ -230,19 +241,21 @@ pub(crate) fn write_targets(
     edit.finish()
 }
 
-/// Computes how the joints of a document move when its points are displaced by `by`.
+/// Computes how the joints of a document move when its points are displaced by `moves`.
 pub(crate) fn skeleton(
     document: &GltfDocument,
     rig: &Rig<'_>,
     triangles: &[[u32; 3]],
-    (by, is_outside): (&[DVec3], &[bool]),
-    (options, up): (&ReshapeOptions, DVec3),
+    moves: PointMoves<'_>,
+    options: &ReshapeOptions,
+    up: DVec3,
 ) -> Result<Skeleton, WriteError> {
+    let PointMoves { by, is_outside } = moves;
     check_turn(document, options)?;
     let (joints, keep_travel, none) = (options.joints, options.keep_travel, HashMap::new());
     let ground = if options.ground {
         let options = ReshapeOptions { feet: Feet::Free, ..options.clone() };
-        reshape(document, rig, triangles, (by, is_outside), &[], (&options, up))?.1.ground
+        reshape(document, rig, triangles, moves, &[], &options, up)?.1.ground
     } else {
         None
     };
