@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use cagework_core::BindOptions;
 use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
 use cagework_core::team::Team;
 use cagework_core::words::{counted, grouped};
-use cagework_core::{BindOptions, Cage};
 use cagework_io::{Model, ModelFormat, PointFile, UpAxis, shown, write_field_blender, write_field_npz};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -156,7 +156,7 @@ pub(crate) fn write_lattice(
         let message = format!("{}: a lattice of this format ends in .{wanted}", shown_path(output));
         return Err(CliError::Mismatch { message, hint });
     }
-    let (_, field) = field_of_deform(args, model)?;
+    let field = field_of_deform(args, model)?;
     let bytes = match args.lattice_format {
         LatticeFormat::Npz => write_field_npz(&field, model.origin(), model.up()),
         LatticeFormat::Blender => write_field_blender(&field, model.up().vector_turned(model.origin())),
@@ -166,31 +166,27 @@ pub(crate) fn write_lattice(
     Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
 }
 
-/// Loads the cage, and computes the field of the only pose, for `--lattice` and for splats and points.
+/// Loads the cage, and computes the field of the only pose, for `--lattice`.
 ///
 /// # Errors
 /// If a file cannot be read, files do not match, or the bind fails.
-pub(crate) fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<(Cage, Field), CliError> {
+fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<Field, CliError> {
     let [pose] = args.pose.as_slice() else {
         return Err(CliError::Mismatch {
-            message: format!(
-                "a lattice, splats and points take one pose, but {} were given",
-                args.pose.len()
-            ),
+            message: format!("a lattice takes one pose, but {} were given", args.pose.len()),
             hint: "run the command once per pose",
         });
     };
     if !args.pose_controls.is_empty() {
         return Err(CliError::Mismatch {
-            message: "a lattice, splats and points do not take --pose-controls".into(),
+            message: "a lattice does not take --pose-controls".into(),
             hint: "`cagework map` takes controls inside the cage",
         });
     }
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, model, args.read.memory, &controls)?;
     let held = (model.bytes(), args.lattice_cells);
-    let field = field_of(&cage, pose, None, (model.up(), args.read.memory), held)?;
-    Ok((cage.cage, field))
+    field_of(&cage, pose, None, (model.up(), args.read.memory), held)
 }
 
 /// Computes the field of a pose of a cage. `held`: memory in use, bytes. `cells`: number of lattice cells along the

@@ -62,8 +62,8 @@ pub struct PoseSettings {
     /// Pinned surface points; null if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pins: Option<Vec<SurfacePoint>>,
-    /// Whether the pose was saved for the cage of the project.
-    pub fits: bool,
+    /// Whether the pose was saved for another cage than that of the project, with as many controls.
+    pub other_cage: bool,
     /// Share of the pose in the current pose, 0 to 1.
     pub share: f32,
     /// Time from the previous pose to this one, seconds.
@@ -78,7 +78,7 @@ impl Default for PoseSettings {
         Self {
             proportions: Proportions::default(),
             pins: None,
-            fits: true,
+            other_cage: false,
             share: 0.0,
             lead: SECONDS_PER_POSE,
             interpolation: None,
@@ -99,8 +99,7 @@ impl DocumentSettings {
         let of_pose = |(k, pose): (usize, &NamedPose)| PoseSettings {
             proportions: pose.proportions,
             pins: pose.pins.as_ref().map(|pins| pins.to_vec()),
-            // Poses with another number of positions never fit.
-            fits: pose.positions.len() != n_controls || document.fits(pose),
+            other_cage: pose.positions.len() == n_controls && !document.fits(pose),
             share: shares.get(k).copied().filter(|_| pose_is_stored).unwrap_or_default(),
             lead: pose.lead,
             interpolation: pose.interpolation,
@@ -192,11 +191,11 @@ impl DocumentSettings {
     ) -> Vec<NamedPose> {
         let cage = cage.map(|cage| (cage.mesh.positions.len(), cage_id(&cage.mesh)));
         let named = |(k, (name, positions)): (usize, (String, Vec<Vec3>))| {
-            let PoseSettings { proportions, pins, fits, lead, interpolation, .. } =
+            let PoseSettings { proportions, pins, other_cage, lead, interpolation, .. } =
                 self.saved_poses.get(k).cloned().unwrap_or_default();
             NamedPose {
                 name: name.into(),
-                cage: cage.filter(|(n, _)| fits && *n == positions.len()).map(|(_, id)| id),
+                cage: cage.filter(|(n, _)| !other_cage && *n == positions.len()).map(|(_, id)| id),
                 positions: Arc::from(positions),
                 pins: pins.map(Into::into),
                 lead,

@@ -114,8 +114,7 @@ pub(super) fn text(summary: &DeformSummary) -> String {
             format!("deformed {} in {ms:.0} ms\nwrote {output}\n", splats_or_points(*is_splats, *points))
         }
         Subject::Clip { clip, frames, seconds, .. } => format!(
-            "bent {frames} frames of clip {} ({} s)\nwrote {output}: its frames as morph targets and an animation, \
-             without skeleton\n",
+            "bent {frames} frames of clip {} ({} s)\nwrote {output}\n",
             shown(clip),
             decimals(*seconds, 2),
         ),

@@ -110,7 +110,7 @@ fn the_lattice_is_written_without_weights() {
     sandbox
         .run(&format!("{deform} --pose cage.obj --lattice field.npz"))
         .code(1)
-        .stderr(contains("take one pose, but 2 were given"));
+        .stderr(contains("takes one pose, but 2 were given"));
 }
 
 #[test]
