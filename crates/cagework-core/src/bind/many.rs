@@ -167,7 +167,7 @@ mod tests {
             for turns in [3.0, 20.0] {
                 let points = points(turns);
                 let alone = bind(&points, controls, &options, &NoProgress).unwrap();
-                let together = solved.bind(&points, (0, 0), &NoProgress).unwrap();
+                let together = solved.bind(&points, 0, 0, &NoProgress).unwrap();
                 assert!(together.weights == alone.weights && together.frames == alone.frames, "{options:?}");
                 let said =
                     |b: &Binding| (b.report.iterations, b.report.rest_error, b.report.outside_vertices);
