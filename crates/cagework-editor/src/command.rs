@@ -63,7 +63,7 @@ pub enum Command {
         /// Factor, 0.5 to 2; 1 keeps the length at rest.
         factor: f64,
     },
-    /// Sets the factors of all proportions to those of a preset, or to 1.
+    /// Sets the factors of a preset, or all to 1. A preset of one factor keeps the others.
     SetPreset {
         /// Name of the preset; null sets all factors to 1.
         name: Option<String>,

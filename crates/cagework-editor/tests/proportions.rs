@@ -120,6 +120,20 @@ fn a_pose_that_is_applied_on_other_factors_loses_its_own_at_a_reset() {
 }
 
 #[test]
+fn presets_of_one_part_add_up_and_whole_figures_replace_all() {
+    let mut editor = opened(&GLB);
+    let mut preset = |name: &str| {
+        editor.apply(Command::SetPreset { name: Some(name.to_owned()) }).unwrap();
+        let proportions = editor.document().proportions;
+        [Proportion::Leg, Proportion::Head].map(|proportion| proportions.factor(proportion, 0))
+    };
+    assert_eq!(preset("longer legs"), [1.2, 1.0]);
+    assert_eq!(preset("big head"), [1.2, 1.35]);
+    assert_eq!(preset("chibi"), [0.65, 1.7]);
+    assert_eq!(preset("longer legs"), [1.2, 1.7]);
+}
+
+#[test]
 fn saved_poses_restore_their_factors_and_a_blend_shows_factors_of_1() {
     let mut editor = opened(&GLB);
     editor.apply(Command::SavePose { name: "rest".to_owned() }).unwrap();

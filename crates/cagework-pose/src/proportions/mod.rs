@@ -309,6 +309,12 @@ pub const PRESETS: [Preset; 6] = [
 ];
 
 impl Preset {
+    /// The factor of a preset that changes one proportion, with its name; `None` for those that change several.
+    #[must_use]
+    pub fn only_factor(&self) -> Option<(&'static str, f64)> {
+        if let [only] = self.factors { Some(*only) } else { None }
+    }
+
     /// Factors of the preset.
     ///
     /// # Errors

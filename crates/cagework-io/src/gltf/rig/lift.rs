@@ -41,6 +41,8 @@ pub(super) struct LiftInput<'a> {
     pub(super) shared: Option<&'a Ground>,
     /// Lift of the rest shape.
     pub(super) lift: f64,
+    /// Whether each vertex belongs to something that is carried. `[n_vertices]`
+    pub(super) carried: &'a [bool],
     /// Up axis of the file.
     pub(super) up: DVec3,
 }
@@ -69,7 +71,7 @@ pub(super) fn lift_clips(
     let top_of = tops(rig, given.named);
     let worlds = Worlds::new(&after.root)?;
     let names = given.named.filter(|named| named.of_nodes.iter().any(Option::is_some));
-    let candidates = if names.is_some() { Vec::new() } else { candidates(&players[0]) };
+    let candidates = if names.is_some() { Vec::new() } else { candidates(&players[0], given.carried) };
     let mut edit = Edit::new(&after);
     let mut all = Vec::new();
     let n_samples = MAX_SAMPLES / players[0].clips().len().max(1);
@@ -130,8 +132,9 @@ fn tops(rig: &Rig<'_>, named: Option<&NamedMoves>) -> Vec<Option<usize>> {
     tops
 }
 
-/// Finds the vertices that can be the lowest ones of their joint in some pose, with the node of this joint.
-fn candidates(player: &Player) -> Vec<(u32, Option<u32>)> {
+/// Finds the vertices that can be the lowest ones of their joint in some pose, with the node of this joint. Ignores
+/// vertices that are `carried`.
+fn candidates(player: &Player, carried: &[bool]) -> Vec<(u32, Option<u32>)> {
     let skin = &player.skin;
     let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
     let directions: Vec<Vec3> = (0..DIRECTIONS)
@@ -144,6 +147,9 @@ fn candidates(player: &Player) -> Vec<(u32, Option<u32>)> {
         .collect();
     let mut farthest: BTreeMap<u32, Vec<(f32, u32)>> = BTreeMap::new();
     for (v, &rest) in (0..).zip(&skin.positions) {
+        if carried.get(v as usize) == Some(&true) {
+            continue;
+        }
         let range = |starts: &[u32]| starts[v as usize] as usize..starts[v as usize + 1] as usize;
         let joints = &skin.joints[range(&skin.joint_starts)];
         let Some(&(joint, _)) = joints.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };

@@ -10,6 +10,7 @@
 //! [`reshape()`] writes the document.
 
 mod binds;
+mod carried;
 mod clip;
 mod edit;
 mod expressions;

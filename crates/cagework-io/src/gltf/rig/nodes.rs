@@ -95,6 +95,9 @@ pub(super) struct Deformation<'a> {
     pub(super) rigid: &'a HashMap<u32, Motion>,
     /// Moves of nodes given by a skeleton that is shared with other files.
     pub(super) named: Option<&'a NamedMoves>,
+    /// Whether each vertex belongs to something that is carried, which does not count for the height of the hips; empty
+    /// if that is not known. `[n_vertices]`
+    pub(super) carried: &'a [bool],
     /// Up axis of the file.
     pub(super) up: DVec3,
 }
@@ -460,7 +463,10 @@ impl Rig<'_> {
             let holder = joint.map(Index::value).or(part.instance.node.map(|node| node as usize));
             let Some(skeleton) = holder.and_then(|node| skeletons[node]) else { continue };
             let motion = part.instance.node.and_then(|node| given.rigid.get(&node));
-            for (at, by) in part.rest().into_iter().zip(&given.by[part.first..]) {
+            for (v, (at, by)) in (part.first..).zip(part.rest().into_iter().zip(&given.by[part.first..])) {
+                if given.carried.get(v) == Some(&true) {
+                    continue;
+                }
                 let by = motion.map_or(*by, |motion| motion.by(at));
                 for ([low, high], at) in boxes[skeleton].iter_mut().zip([at, at + by]) {
                     (*low, *high) = (low.min(at), high.max(at));

@@ -88,7 +88,8 @@ pub(crate) fn reshape(
     let grounded;
     let mut by = by;
     let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
-    let own = options.ground.then(|| rig.ground(by, up));
+    let carried = if options.ground { rig.carried_in_hands(triangles) } else { Vec::new() };
+    let own = options.ground.then(|| rig.ground(by, &carried, up));
     // Vertices are in the unit of the cage. A file without vertices can be in another unit than the body.
     let unit = named.as_ref().filter(|_| rig.parts.is_empty()).map_or(1.0, |named| named.scale);
     let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground.as_ref());
@@ -134,7 +135,16 @@ pub(crate) fn reshape(
         let (joints, keep_travel) = (options.joints, options.keep_travel);
         let motions = rig.motions(&rigid, by, is_outside);
         let named = named.as_ref();
-        let given = Deformation { by, is_outside, joints, keep_travel, rigid: &motions, named, up };
+        let given = Deformation {
+            by,
+            is_outside,
+            joints,
+            keep_travel,
+            rigid: &motions,
+            named,
+            carried: &carried,
+            up,
+        };
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.outside.len();
@@ -189,7 +199,8 @@ pub(crate) fn reshape(
     }
     let mut edited = edit.into_document()?;
     if lifts_clips {
-        let lows = lift::LiftInput { named: named.as_ref(), shared: shared.as_ref(), lift: report.lift, up };
+        let (named, shared, lift) = (named.as_ref(), shared.as_ref(), report.lift);
+        let lows = lift::LiftInput { named, shared, lift, carried: &carried, up };
         let (lifted, clips) = lift::lift_clips(rig, edited, &lows)?;
         edited = lifted;
         report.clip_lifts = clips.iter().map(|clip| clip.lift).collect();
@@ -261,7 +272,10 @@ pub(crate) fn skeleton(
     };
     let lift = ground.as_ref().map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
     let by = by.iter().map(|&by| by + lift).collect::<Vec<_>>();
-    let given = Deformation { by: &by, is_outside, joints, keep_travel, rigid: &none, named: None, up };
+    let carried = if options.ground { rig.carried_in_hands(triangles) } else { Vec::new() };
+    let carried = carried.as_slice();
+    let given =
+        Deformation { by: &by, is_outside, joints, keep_travel, rigid: &none, named: None, carried, up };
     let mut json = document.json.clone();
     // `Rig::moved` computes the travel factors only for documents with animations. The clips of other files need them.
     if json["animations"].as_array().is_none_or(Vec::is_empty) {
@@ -271,11 +285,13 @@ pub(crate) fn skeleton(
 }
 
 impl Rig<'_> {
-    /// Finds the heights of the lowest visible vertex at rest, before and after the deformation.
-    fn ground(&self, by: &[DVec3], up: DVec3) -> Ground {
+    /// Finds the heights of the lowest visible vertex at rest, before and after the deformation. Ignores vertices that
+    /// are `carried`. `[n_vertices]`
+    fn ground(&self, by: &[DVec3], carried: &[bool], up: DVec3) -> Ground {
         let mut lows = [f64::INFINITY; 2];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {
-            for (at, by) in part.rest().into_iter().zip(&by[part.first..]) {
+            let own = part.rest().into_iter().zip(&by[part.first..]).zip(&carried[part.first..]);
+            for ((at, by), _) in own.filter(|(_, carried)| !**carried) {
                 let heights = [at, at + *by].map(|p| p.dot(up));
                 lows = [0, 1].map(|k| lows[k].min(heights[k]));
             }

@@ -7,7 +7,7 @@ use cagework_core::deform::displacements;
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Cage};
 use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport, write_mesh_glb};
-use glam::{Mat3, Mat4, Vec3, vec3};
+use glam::{DVec3, Mat3, Mat4, Vec3, vec3};
 
 use serde_json::json;
 
@@ -66,8 +66,8 @@ fn origin(model: &Model, name: &str) -> Vec3 {
     }
 }
 
-fn still(model: &Model) -> Vec<glam::DVec3> {
-    vec![glam::DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()]
+fn still(model: &Model) -> Vec<DVec3> {
+    vec![DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()]
 }
 
 #[test]
@@ -171,4 +171,33 @@ fn targets_inside_the_cage_flip_no_triangles() {
             .count()
     };
     assert_eq!([up(0.0), up(0.5), up(1.0)], [0; 3], "triangles that do not face up");
+}
+
+/// The walking sample with a spear in its left hand, whose tip is 0.2 below the soles.
+fn spearman() -> Model {
+    let mut sample = samples::build("humanoid").unwrap();
+    let rig = sample.rig.as_mut().unwrap();
+    let hand = rig.joints.iter().position(|joint| joint.name == "hand.L").unwrap();
+    let (at, first) = (rig.joints[hand].at, sample.mesh.positions.len() as u32);
+    sample.mesh.positions.extend([at, at + vec3(0.02, 0.0, 0.0), vec3(at.x, -0.2, at.z)]);
+    sample.mesh.triangles.push([first, first + 1, first + 2]);
+    sample.colours.extend([[90, 90, 90, 255]; 3]);
+    rig.influences.extend([[(hand as u32, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]; 3]);
+    read(&write_mesh_glb("spearman", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap())
+}
+
+#[test]
+fn what_a_hand_carries_does_not_stand_on_the_ground() {
+    let model = spearman();
+    let n = model.positions.len();
+    // Everything rises by 0.1, and the tip of the spear falls by 0.3.
+    let mut by = vec![DVec3::Y * 0.1; n + model.extra_points().unwrap().len()];
+    by[n - 1] = DVec3::NEG_Y * 0.3;
+    let options = ReshapeOptions { ground: true, ..ReshapeOptions::default() };
+    let (glb, report) = model.write_reshaped(&by, &[], &[], &options).unwrap();
+    let low = |positions: &[Vec3]| positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
+    let stood = read(&glb);
+    assert!((low(&stood.positions[..n - 3]) - low(&model.positions[..n - 3])).abs() < 1e-5);
+    assert!((report.lift + 0.1).abs() < 1e-6, "{}", report.lift);
+    assert!(report.clip_lifts.iter().all(|lift| lift.abs() < 1e-3), "{:?}", report.clip_lifts);
 }
