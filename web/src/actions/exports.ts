@@ -64,7 +64,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
       const name = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
       files.push({ name, bytes: own[kind](member.id) as Uint8Array<ArrayBuffer> });
-      if (kind === "glb" || kind === "shape") for (const notice of engine().rigNotices()) notices.add(notice);
+      for (const notice of engine().rigNotices()) notices.add(notice);
     }
     const [first] = files;
     if (exportOnly === "zip" && first && files.length > 1) {
@@ -74,7 +74,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
     await deliver(files, notices);
   };
 
-  /** Downloads files, then shows their names, their total size and the notices. */
+  /** Downloads files, then shows the notices, and last the names of the files: only the latest messages stay visible. */
   const deliver = async (files: readonly ExportedFile[], notices: ReadonlySet<string>) => {
     for (const [k, { name, bytes }] of files.entries()) {
       if (k > 0) await new Promise((resolve) => setTimeout(resolve, DOWNLOAD_PAUSE_MS));
@@ -82,8 +82,8 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
     }
     const size = files.reduce((sum, { bytes }) => sum + bytes.length, 0);
     const names = files.map(({ name }) => name);
-    ctx.tell.say(T.exports.saved(names, size));
     for (const notice of notices) ctx.tell.say(sentence(notice));
+    ctx.tell.say(T.exports.saved(names, size));
   };
 
   const picture = () => {

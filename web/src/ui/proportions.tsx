@@ -80,6 +80,7 @@ function Sliders({ app }: { app: App }) {
   });
   return (
     <>
+      <Toggle label={T.proportions.apart} value={isApart} onChange={app.proportions.apart} />
       {GROUPS.map((group) => (
         <fieldset class="field sliders" key={group}>
           <legend class="legend-text">{T.proportions.groups[group]}</legend>
@@ -106,18 +107,13 @@ function Sliders({ app }: { app: App }) {
       {folded.length > 0 && (
         <p class="hint warn-text">{T.proportions.folds(list(folded.map(([, title]) => title)))}</p>
       )}
-      <div class="row">
-        <div class="grow">
-          <Toggle label={T.proportions.apart} value={isApart} onChange={app.proportions.apart} />
-        </div>
-        <Button
-          label={T.proportions.resetAll}
-          icon="reset"
-          tip={T.proportions.resetTip}
-          disabled={!scaled}
-          onClick={() => app.proportions.preset(null)}
-        />
-      </div>
+      <Button
+        label={T.proportions.resetAll}
+        icon="reset"
+        tip={T.proportions.resetTip}
+        disabled={!scaled}
+        onClick={() => app.proportions.preset(null)}
+      />
     </>
   );
 }
