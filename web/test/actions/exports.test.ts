@@ -90,17 +90,17 @@ it("files are named after the model and their size is shown", async () => {
   await exports.save("glb");
   await exports.save("cage");
   expect(downloads).toEqual(["cube-posed.glb", "cube-cage.obj"]);
-  expect(said.slice(0, 2)).toEqual(["cube-posed.glb is in your downloads (2 kB).", "3 of 4 joints moved."]);
+  expect(said.slice(0, 2)).toEqual(["3 of 4 joints moved.", "cube-posed.glb is in your downloads (2 kB)."]);
   store.set({ model: { ...MODEL, name: "someone.vrm" } });
   await exports.save("glb");
   expect(downloads.at(-1), "a VRM keeps its extension").toBe("someone-posed.vrm");
   store.set({ shapeFormat: "stl", shapeMoment: "rest" });
   await exports.save("shape");
   expect(downloads.at(-1), "a shape has its own format").toBe("someone-posed.stl");
-  expect(said.at(-2)).toContain("(3 byte)");
+  expect(said.at(-1)).toContain("(3 byte)");
   store.set({ shapeFormat: "ply", shapeMoment: "frame" });
   await exports.save("shape");
-  expect(said.at(-2), "the shown frame of a clip").toContain("(4 byte)");
+  expect(said.at(-1), "the shown frame of a clip").toContain("(4 byte)");
   const glb = "model/gltf-binary";
   expect(types).toEqual([glb, "model/obj", glb, "model/stl", "application/octet-stream"]);
 });
@@ -125,8 +125,8 @@ it("each of several models is exported to its own file; one of them can be expor
     ["body-posed.vrm", "shirt-posed.glb", "shirt-posed-2.glb"],
   ]);
   expect(said).toEqual([
-    "body-posed.vrm, shirt-posed.glb, and shirt-posed-2.glb are in your downloads (3 kB).",
     "3 of 4 joints moved.",
+    "body-posed.vrm, shirt-posed.glb, and shirt-posed-2.glb are in your downloads (3 kB).",
   ]);
   store.set({ exportOnly: 5 });
   await exports.save("weights");
@@ -138,7 +138,7 @@ it("each of several models is exported to its own file; one of them can be expor
   store.set({ exportOnly: "zip" });
   await exports.save("glb");
   expect([downloads.slice(8), types.at(-1)]).toEqual([["body-posed.zip"], "application/zip"]);
-  expect(said.at(-2)).toBe("body-posed.zip is in your downloads (1 byte).");
+  expect(said.at(-1)).toBe("body-posed.zip is in your downloads (1 byte).");
 });
 
 it("files of clips are fitted to the skeleton and downloaded", async () => {
@@ -155,8 +155,8 @@ it("files of clips are fitted to the skeleton and downloaded", async () => {
   await exports.clips([file("walk.glb"), file("walk.glb")]);
   expect(downloads).toEqual(["walk-posed.glb", "walk-posed-2.glb"]);
   expect(said).toEqual([
-    "walk-posed.glb and walk-posed-2.glb are in your downloads (2 byte).",
     "3 of 4 joints moved.",
+    "walk-posed.glb and walk-posed-2.glb are in your downloads (2 byte).",
   ]);
   await exports.clips([file("tree.glb")]);
   expect(downloads.length).toBe(2);
