@@ -43,8 +43,7 @@ impl Editor {
     /// Sets the factors of a preset. A preset of one factor keeps the others, so that presets add up; with a preset of
     /// several factors the others become 1.
     pub(crate) fn set_preset(&mut self, name: &str) -> Result<(), EditError> {
-        let only =
-            PRESETS.iter().filter(|preset| preset.name == name).find_map(|preset| preset.only_factor());
+        let only = PRESETS.iter().filter(|preset| preset.name == name).find_map(Preset::only_factor);
         match only {
             Some((proportion, factor)) => self.set_proportion(proportion, factor),
             None => self.set_proportions(Proportions::from_preset(Some(name), &BTreeMap::new())?),
