@@ -38,7 +38,8 @@ pub(crate) struct RigArgs {
     /// Keep the travel distance of clips; by default it is scaled with the height of the hips.
     #[arg(long)]
     keep_travel: bool,
-    /// Lift or lower the deformed model, and each of its clips, so that the lowest point keeps its height.
+    /// Lift or lower the deformed model, and each of its clips, so that the lowest point keeps its height. What a humanoid
+    /// carries in one hand does not count.
     #[arg(long, conflicts_with = "shape_only")]
     pub(crate) ground: bool,
     /// Feet in clips: lock holds them in place while they are on the ground, by rotating thighs and shins; free leaves the

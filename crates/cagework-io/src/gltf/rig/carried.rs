@@ -19,11 +19,11 @@ impl Rig<'_> {
         let none = || vec![false; self.n_vertices];
         let Ok(Some(rest)) = rest_rig(self.document, self.origin) else { return none() };
         let Ok(humanoid) = Humanoid::of_rig(&rest, &[]) else { return none() };
-        let mut carried = none();
+        let (mut carried, mut pieces) = (none(), self.pieces(triangles));
         for hand in [Bone::LeftHand, Bone::RightHand].into_iter().filter_map(|bone| humanoid.joint(bone)) {
             let below = below(&rest, hand);
             let hangs: Vec<bool> = (0..self.n_vertices).map(|v| weight(&rest, &below, v) >= LEAST).collect();
-            let mut pieces = self.pieces(triangles);
+            // Whether each piece, by its root, hangs on the hand as a whole.
             let mut whole = hangs.clone();
             for v in (0..self.n_vertices).filter(|&v| !hangs[v]) {
                 whole[pieces.root(v as u32) as usize] = false;
