@@ -23,7 +23,7 @@ use crate::sleeves::{self, SleeveError, Sleeves};
 const SPANNING: f64 = 0.1;
 
 /// Score of a cage without rings, in diagonals of the model's box.
-const NO_RINGS: f64 = 0.01;
+const NO_RINGS: f64 = 0.02;
 
 /// Score of sleeves if no limb has a ring, in diagonals of the model's box.
 const NO_LIMBS: f64 = 0.1;
@@ -36,7 +36,7 @@ const SLEEVE_SHARE: f32 = 0.7;
 /// With [`CageKind::Auto`], the cage consists of sleeves if they enclose the model and have a lower score than the shell;
 /// otherwise [`CageReport::refusal`] says why it does not. The score is a mean distance: that of the cage's surface from
 /// the model, in diagonals of the model's box, plus 0.1 times the share of its area whose corners are nearest to two
-/// different limbs, plus 0.01 without rings, or 0.1 times the share of the limbs that share the rings of their parent.
+/// different limbs, plus 0.02 without rings, or 0.1 times the share of the limbs that share the rings of their parent.
 /// Models without a rig keep a shell that has at most three quarters of the vertices of the sleeves.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:

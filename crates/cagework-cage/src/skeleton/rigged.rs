@@ -15,6 +15,10 @@ pub(super) const MAX_JOINTS: usize = 1024;
 /// parent.
 const SMALL_BRANCH: f64 = 0.13;
 
+/// Two joints with the same parent are a pair if each is this close to the image of the other, as a share of the
+/// distance between the joint and its own image.
+const MAX_TWIN_ERROR: f64 = 0.1;
+
 /// Cosine between a leg and the spine below which the model is a biped.
 const BIPED_COSINE: f64 = -0.4;
 
@@ -66,9 +70,7 @@ pub(super) fn of_rig(positions: &[Vec3], rig: &Rig) -> Result<Skeleton, Skeleton
             tree.label[joint] = main;
         }
     }
-    let alive = (0..tree.at.len()).filter(|&joint| tree.is_alive[joint]);
-    let joints: Vec<DVec3> = alive.map(|joint| tree.at[joint]).collect();
-    let plane = MirrorPlane::of(positions, &joints);
+    let plane = MirrorPlane::of(positions, &tree.joints());
     let is_used = vec![false; tree.at.len()];
     let mut figure = Figure { tree, points, plane, is_used };
     let trunk = figure.trunk(main);
@@ -169,6 +171,17 @@ fn reach(tree: &JointTree, points: &[DVec3], joint: usize) -> f64 {
     tree.vertices_below(joint).map(|v| points[v as usize].distance(tree.at[joint])).fold(0.0, f64::max)
 }
 
+/// Whether a joint lies on the mirror plane, and is not one of a pair beside it.
+fn is_mid(tree: &JointTree, plane: &MirrorPlane, joint: usize) -> bool {
+    let at = tree.at[joint];
+    let is_twin = |&other: &usize| {
+        let distance = plane.image(tree.at[other]).distance(at);
+        other != joint && distance < MAX_TWIN_ERROR * at.distance(plane.image(at))
+    };
+    plane.has(at)
+        && !tree.parent[joint].is_some_and(|parent| tree.children[parent].iter().any(|c| is_twin(c)))
+}
+
 /// Merges the children of a joint that reach less far than `limit` into it, unless it has only one child.
 fn merge_small_branches(tree: &mut JointTree, points: &[DVec3], joint: usize, limit: f64) {
     if !tree.is_alive[joint] || tree.children[joint].len() < 2 {
@@ -187,7 +200,7 @@ impl Figure {
     }
 
     fn is_mid(&self, joint: usize) -> bool {
-        self.plane.has(self.tree.at[joint])
+        is_mid(&self.tree, &self.plane, joint)
     }
 
     /// Finds the joints of the trunk: the longest path of joints on the mirror plane that goes down from `main`.

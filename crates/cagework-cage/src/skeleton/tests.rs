@@ -105,6 +105,19 @@ pub(crate) fn biped(feet: bool) -> Figure {
     of
 }
 
+/// The diagonal is 2.57, so joints within 0.0515 of the mirror plane lie on it.
+#[test]
+fn shoulders_beside_the_mirror_plane_are_a_pair() {
+    let mut figure = biped(false);
+    for (name, x) in [("arm.L", 0.052), ("arm.R", -0.0505)] {
+        let joint = figure.rig.joints.iter_mut().find(|joint| joint.name == name).unwrap();
+        joint.at.x = x;
+    }
+    let skeleton = figure.skeleton();
+    assert_eq!(names(&skeleton), names(&biped(false).skeleton()));
+    assert_eq!(skeleton.chains[3].mirror, Some(4));
+}
+
 fn quadruped() -> Figure {
     let mut of = Figure::default();
     let hips = of.joint("hips", None, [0.0, 1.0, -0.7]);

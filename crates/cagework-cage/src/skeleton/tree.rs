@@ -54,6 +54,11 @@ impl JointTree {
         }
     }
 
+    /// Positions of the joints that are in use.
+    pub(super) fn joints(&self) -> Vec<DVec3> {
+        (0..self.at.len()).filter(|&joint| self.is_alive[joint]).map(|joint| self.at[joint]).collect()
+    }
+
     fn roots(&self) -> Vec<usize> {
         (0..self.at.len()).filter(|&joint| self.is_alive[joint] && self.parent[joint].is_none()).collect()
     }

@@ -133,7 +133,10 @@ impl<'a> Fit<'a> {
             base,
         };
         fit.name_unknowns();
-        fit.targets = samples.iter().map(|sample| fit.target(sample, plan.clearance)).collect();
+        fit.targets = samples
+            .iter()
+            .map(|sample| fit.target(sample.at, sample.limb as usize, plan.clearance))
+            .collect();
         fit.separate();
         // Mirrored targets give the same constraints.
         fit.targets.retain(|target| {
@@ -218,8 +221,8 @@ impl<'a> Fit<'a> {
         }
     }
 
-    fn target(&self, sample: &Sample, clearance: f64) -> Target {
-        let i = sample.limb as usize;
+    /// Target at a point of limb `i`.
+    pub(super) fn target(&self, at: DVec3, i: usize, clearance: f64) -> Target {
         let limb = &self.plan.limbs[i];
         let stops = limb.stops();
         let n = stops.len();
@@ -230,10 +233,10 @@ impl<'a> Fit<'a> {
         let is_rump = i == 0 && !self.plan.is_biped;
         let inset = if is_rump { (CORE_MARGIN * width).min(0.5 * (stops[1] - stops[0])) } else { 0.0 };
         let low = stops[0] + inset;
-        let s = limb.project(sample.at).s.min(top).max(low);
+        let s = limb.project(at).s.min(top).max(low);
         let k = stops.partition_point(|&x| x <= s).clamp(1, n - 1) - 1;
         let share = (s - stops[k]) / (stops[k + 1] - stops[k]).max(f64::MIN_POSITIVE);
-        Target { at: sample.at, limb: i, clearance, stop: k, share }
+        Target { at, limb: i, clearance, stop: k, share }
     }
 
     /// Origins of the rays through the targets. `[n_targets]`
@@ -348,7 +351,9 @@ impl<'a> Fit<'a> {
                 .iter()
                 .zip(is_inside)
                 .filter(|(_, inside)| *inside != [true; 2])
-                .map(|(sample, _)| self.target(sample, MISSED_CLEARANCE * self.plan.clearance))
+                .map(|(sample, _)| {
+                    self.target(sample.at, sample.limb as usize, MISSED_CLEARANCE * self.plan.clearance)
+                })
                 .collect();
             if missed.is_empty() || missed.len() > MAX_MISSED {
                 break;

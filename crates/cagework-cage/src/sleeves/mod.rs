@@ -18,6 +18,7 @@ mod fit;
 mod guard;
 mod limb;
 mod program;
+mod remedies;
 mod rings;
 mod samples;
 mod separate;
@@ -38,6 +39,7 @@ use base::Place;
 use fit::Fit;
 use guard::{Fault, verify};
 use limb::Limb;
+use remedies::Remedies;
 use samples::{FINE_SPACING, MAX_SAMPLES, SPACING, Sample, n_samples, samples, thinned};
 
 /// Smallest distance of rings from the model, as a share of the model's diagonal.
@@ -54,14 +56,15 @@ const ATTEMPTS: [(f64, f64, bool); 6] = [
     (0.7, 0.5 * CLEARANCE, true),
 ];
 
+/// Index in [`ATTEMPTS`] before which limbs are changed, while there is a change left; and the largest number of attempts.
+const FIRST_REMEDY: usize = 4;
+const MAX_ATTEMPTS: usize = 14;
+
 /// Share of the work of an attempt that is the fit of rings; the rest is that of vertices.
 const RING_SHARE: f32 = 0.6;
 
 /// Smallest number of vertices of a sleeve cage: two rings of the trunk.
 const MIN_VERTICES: usize = 12;
-
-/// Arc lengths of rings, as a share of the limb's length, that count as equal.
-const SAME_RING: f64 = 0.01;
 
 /// Shortest straightened tip.
 const MIN_TIP: f64 = 0.02;
@@ -218,8 +221,7 @@ struct Plan<'a> {
     is_biped: bool,
     target: usize,
     clearance: f64,
-    /// Limbs, by [`Limb::id`], and shares of their lengths near which no optional ring is placed.
-    avoid: Vec<(usize, f64)>,
+    remedies: &'a Remedies,
     /// Limbs without a sleeve of their own, one sentence each.
     notes: Vec<String>,
 }
@@ -228,7 +230,7 @@ struct Plan<'a> {
 ///
 /// `positions`: `[n_vertices]`, object units. `triangles`: `[n_triangles]`, any soup. The cage encloses all vertices, and
 /// triangles as sampled at distances of 0.02 diagonals, and of 0.01 if one more attempt suffices. An attempt takes
-/// 0.3 s of one core for 12,000 triangles and 0.5 s for 100,000; there are at most six.
+/// 0.3 s of one core for 12,000 triangles and 0.5 s for 100,000; there are at most fourteen.
 ///
 /// # Errors
 /// [`Refusal`] if no attempt passes the checks, or cancellation.
@@ -263,21 +265,22 @@ pub fn generate(
     };
     let [coarse, fine] = [points(&unmirrored), points(&checked)];
     let mut refusal = None;
-    let mut avoid: Vec<(usize, f64)> = Vec::new();
-    let mut straight: Vec<usize> = Vec::new();
-    let mut fused: Vec<usize> = Vec::new();
+    let mut remedies = Remedies::default();
     // Encloses only the samples to which sleeves are fitted. Used if the next attempt does not enclose all points.
     let mut enclosing = None;
-    for (attempt, (share, clearance, may_straighten)) in ATTEMPTS.into_iter().enumerate() {
+    let mut next = 0;
+    for attempt in 0..MAX_ATTEMPTS {
+        let Some((share, clearance, may_straighten)) = ATTEMPTS.get(next).copied() else { break };
         let go_on = |done: f32| {
-            let fraction = (attempt as f32 + done) / ATTEMPTS.len() as f32;
+            let fraction = (attempt as f32 + done) / MAX_ATTEMPTS as f32;
             let event =
                 ProgressEvent { stage: Stage::Simplify, fraction, iteration: attempt as u32, delta: None };
             if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
         };
         go_on(0.0)?;
         // The attempt would repeat the first one.
-        if attempt == 1 && straight.is_empty() && fused.is_empty() && enclosing.is_none() {
+        if attempt == 1 && remedies.straight.is_empty() && remedies.fused.is_empty() && enclosing.is_none() {
+            next += 1;
             continue;
         }
         let mut plan = Plan {
@@ -289,14 +292,14 @@ pub fn generate(
             is_biped: skeleton.is_biped,
             target: ((share * target as f64) as usize).max(MIN_VERTICES),
             clearance,
-            avoid: avoid.clone(),
+            remedies: &remedies,
             notes: Vec::new(),
         };
         if may_straighten {
-            plan.straighten(&straight);
+            plan.straighten();
         }
         // Descending, so that indices of limbs are still those of chains.
-        fused.iter().rev().for_each(|&chain| plan.fuse(chain));
+        remedies.fused.iter().rev().for_each(|&chain| plan.fuse(chain));
         plan.start();
         let base = loop {
             match plan.choose_rings().map(|()| plan.base()) {
@@ -323,35 +326,15 @@ pub fn generate(
             unmirrored.extend(points.iter().map(|&i| checked[i]));
             enclosing = Some(sleeves(&fit, cage, &units, skeleton, positions, triangles));
         }
-        if let Fault::Quads(faults) = &fault {
-            for pair in &faults.meeting {
-                let [a, b] = pair.map(|quad| fit.base.quads[quad as usize].limb);
-                straight.extend((a == b && a > 0).then_some(plan.limbs[a].id));
-            }
-            for &quad in faults.meeting.as_flattened().iter().chain(&faults.folded) {
-                let quad = &fit.base.quads[quad as usize];
-                let limb = &plan.limbs[quad.limb];
-                for s in rings_beside(limb, quad.place) {
-                    let share = s / limb.total();
-                    if avoid.iter().all(|&(id, other)| id != limb.id || (share - other).abs() > SAME_RING) {
-                        avoid.push((limb.id, share));
-                        avoid.extend(limb.mirror.map(|image| (plan.limbs[image].id, share)));
-                    }
-                }
-            }
+        let mut learnt = remedies.clone();
+        learnt.learn(&fit, &fault);
+        next += 1;
+        if next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
+            // The rings to avoid were those of other limbs.
+            learnt.avoided.clear();
+            next = FIRST_REMEDY - 1;
         }
-        // Legs that touch get one sleeve.
-        let spine = plan.limbs[0].at[2] - plan.limbs[0].at[1];
-        let is_leg = |limb: &Limb| {
-            let way = limb.at[limb.at.len() - 1] - limb.at[0];
-            limb.mirror.is_some() && way.dot(spine) < -0.5 * way.length() * spine.length()
-        };
-        let touching = fit.unseparated.iter().map(|pair| pair.map(|i| &plan.limbs[i]));
-        fused.extend(
-            touching.filter(|pair| pair.iter().all(|limb| is_leg(limb))).map(|[a, b]| a.id.min(b.id)),
-        );
-        fused.sort_unstable();
-        fused.dedup();
+        remedies = learnt;
         refusal = Some(why);
     }
     Err(refusal.unwrap_or(Refusal::Invalid).into())
@@ -420,21 +403,10 @@ fn limb(id: usize, skeleton: &Skeleton, units: &Units) -> Limb {
     limb
 }
 
-/// Arc lengths of the optional rings beside a quad.
-fn rings_beside(limb: &Limb, place: Place) -> Vec<f64> {
-    let stops = limb.stops();
-    let k = match place {
-        Place::Between(k) => k,
-        Place::Start => 0,
-        Place::End => stops.len() - 2,
-    };
-    let beside = stops[k.max(1)..].iter().take(k + 2 - k.max(1)).copied();
-    beside.filter(|s| !limb.needed.contains(s)).collect()
-}
-
 impl Plan<'_> {
     /// Makes the tips of limbs continue their last bones.
-    fn straighten(&mut self, ids: &[usize]) {
+    fn straighten(&mut self) {
+        let ids = &self.remedies.straight;
         for limb in self.limbs.iter_mut().filter(|limb| ids.contains(&limb.id)) {
             let (n, Some([_, last])) = (limb.at.len(), limb.bones) else { continue };
             if n < 3 {

@@ -344,7 +344,8 @@ impl Plan<'_> {
             let is_blocked = limb.blocked.iter().any(|&[a, b]| a < s && s < b);
             let is_inside = |(origin, least): (DVec3, f64)| (limb.point(s) - origin).dot(limb.side) < least;
             let is_avoided = self
-                .avoid
+                .remedies
+                .avoided
                 .iter()
                 .any(|&(id, share)| id == limb.id && (s - share * limb.total()).abs() < 0.05);
             let is_in_parent = i > 0 && limb.turn.is_none() && limb.beyond.is_some_and(is_inside);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::fit::Fit;
+use super::fit::{Fit, Target};
 
 /// Smallest number of points of a part.
 const MIN_POINTS: usize = 3;
@@ -23,6 +23,11 @@ const CLEARANCE_SHARE: f64 = 0.6;
 
 /// Half the thickness of the slab in which parts without a common plane are separated ring by ring.
 const SLAB: f64 = 0.045;
+
+/// Shares of the points of overlapping parts that a plane leaves on the wrong side, and the largest share of points that
+/// may change limbs.
+const DIVIDED_SHARES: [f64; 3] = [0.05, 0.15, 0.4];
+const MAX_DIVIDED: f64 = 0.25;
 
 /// Steps of the search for a plane.
 const GILBERT_STEPS: usize = 300;
@@ -54,9 +59,10 @@ impl Fit<'_> {
                 target.clearance = target.clearance.min(CLEARANCE_SHARE * target.at.x.abs());
             }
         }
-        let parts = self.parts();
-        for (x, a) in parts.iter().enumerate() {
-            for b in &parts[x + 1..] {
+        let mut parts = self.parts();
+        for x in 0..parts.len() {
+            for y in x + 1..parts.len() {
+                let (a, b) = (&parts[x], &parts[y]);
                 let [first, second] = [&plan.limbs[a.limb], &plan.limbs[b.limb]];
                 // The first segment of a sleeve touches its parent.
                 let is_beside = second.parent == Some(a.limb) && b.segment == 0
@@ -66,22 +72,67 @@ impl Fit<'_> {
                     continue;
                 }
                 let share_edge = first.parent == second.parent && a.segment == 0 && b.segment == 0;
-                if first.mirror == Some(b.limb) && first.is_symmetric {
-                    let plane = self.mirror_plane(a, b);
-                    if plane.gap < MIN_MARGIN && !share_edge {
-                        self.unseparated.push([a.limb, b.limb]);
-                    }
-                    self.keep_apart(plane, a, b);
-                } else if let Some(plane) = separating_plane(&self.at(&a.points), &self.at(&b.points)) {
+                let plane = if first.mirror == Some(b.limb) && first.is_symmetric {
+                    Some(self.mirror_plane(a, b))
+                } else {
+                    separating_plane(&self.at(&a.points), &self.at(&b.points), 0.0)
+                };
+                if let Some(plane) = plane.filter(|plane| plane.gap >= MIN_MARGIN || share_edge) {
                     self.keep_apart(plane, a, b);
                 } else if !share_edge {
-                    let is_done = [self.separate_locally(a, b), self.separate_locally(b, a)];
-                    if is_done != [true; 2] {
-                        self.unseparated.push([a.limb, b.limb]);
+                    let is_done = plane.is_none()
+                        && [self.separate_locally(a, b), self.separate_locally(b, a)] == [true; 2];
+                    if is_done {
+                        continue;
+                    }
+                    let limbs = [a.limb, b.limb];
+                    let dividing =
+                        plane.or_else(|| self.dividing_plane(a, b).filter(|_| plan.remedies.may_divide));
+                    match dividing.filter(|_| plan.remedies.may_divide) {
+                        Some(plane) => self.divide(plane, &mut parts, [x, y]),
+                        None => {
+                            if let Some(plane) = plane {
+                                self.keep_apart(plane, &parts[x], &parts[y]);
+                            }
+                            self.unseparated.push(limbs);
+                        }
                     }
                 }
             }
         }
+    }
+
+    /// Finds a plane that has all but a few points of two parts on their sides.
+    fn dividing_plane(&self, a: &Part, b: &Part) -> Option<Plane> {
+        let (a, b) = (self.at(&a.points), self.at(&b.points));
+        DIVIDED_SHARES.into_iter().find_map(|share| separating_plane(&a, &b, share))
+    }
+
+    /// Keeps two parts on the sides of a plane. Points on the wrong side become points of the other limb, unless there
+    /// are too many.
+    fn divide(&mut self, plane: Plane, parts: &mut [Part], pair: [usize; 2]) {
+        let is_wrong = |fit: &Self, k: usize, side: f64| {
+            side * (plane.normal.dot(fit.targets[k].at) - plane.offset) < 0.0
+        };
+        let wrong: [Vec<usize>; 2] = [(pair[0], 1.0), (pair[1], -1.0)].map(|(part, side)| {
+            parts[part].points.iter().copied().filter(|&k| is_wrong(self, k, side)).collect()
+        });
+        let limbs = pair.map(|part| parts[part].limb);
+        let most = |part: usize| (MAX_DIVIDED * parts[part].points.len() as f64) as usize;
+        if wrong[0].len() > most(pair[0]) || wrong[1].len() > most(pair[1]) {
+            self.unseparated.push(limbs);
+            return;
+        }
+        for side in [0, 1] {
+            let (from, into) = (pair[side], pair[1 - side]);
+            parts[from].points.retain(|k| !wrong[side].contains(k));
+            for &k in &wrong[side] {
+                let Target { at, clearance, .. } = self.targets[k];
+                self.targets[k] = self.target(at, limbs[1 - side], clearance);
+                parts[into].points.push(k);
+            }
+        }
+        self.keep_apart(Plane { gap: 0.0, ..plane }, &parts[pair[0]], &parts[pair[1]]);
     }
 
     fn at(&self, points: &[usize]) -> Vec<DVec3> {
@@ -166,7 +217,7 @@ impl Fit<'_> {
             if others.len() < MIN_POINTS {
                 continue;
             }
-            let plane = separating_plane(&self.at(&own), &self.at(&others));
+            let plane = separating_plane(&self.at(&own), &self.at(&others), 0.0);
             match plane.filter(|_| own.len() >= MIN_POINTS) {
                 Some(plane) => self.keep_beside(plane, &[r], &own),
                 None => is_done = false,
@@ -176,14 +227,23 @@ impl Fit<'_> {
     }
 }
 
-/// Finds the widest plane between two sets of points; `None` if their convex hulls meet.
+/// Finds the widest plane between two sets of points; `None` if their reduced convex hulls meet. `share`: share of the
+/// points of each set that may lie beyond the plane; 0 reduces nothing.
 ///
 /// Gilbert 1966, "An iterative procedure for computing the minimum of a quadratic form on a convex set", applied to the
-/// differences of the points.
-fn separating_plane(a: &[DVec3], b: &[DVec3]) -> Option<Plane> {
+/// differences of the points. Reduced convex hulls: Bennett and Bredensteiner 2000, "Duality and geometry in SVM
+/// classifiers". Their support is the mean of the points that are furthest in a direction.
+fn separating_plane(a: &[DVec3], b: &[DVec3], share: f64) -> Option<Plane> {
     let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
     let least = |points: &[DVec3], way: DVec3| {
-        points.iter().copied().min_by(|p, q| p.dot(way).total_cmp(&q.dot(way)))
+        let n = (share * points.len() as f64) as usize;
+        let by_height = |p: &DVec3, q: &DVec3| p.dot(way).total_cmp(&q.dot(way));
+        if n < 2 {
+            return points.iter().copied().min_by(by_height);
+        }
+        let mut points = points.to_vec();
+        points.select_nth_unstable_by(n - 1, by_height);
+        Some(mean(&points[..n]))
     };
     let support = |way: DVec3| Some(least(a, way)? - least(b, -way)?);
     let mut z = support(mean(a) - mean(b))?;
@@ -217,9 +277,26 @@ mod tests {
                 .map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) + low)
                 .collect()
         };
-        let plane = separating_plane(&cube(2.0), &cube(0.0)).unwrap();
+        let plane = separating_plane(&cube(2.0), &cube(0.0), 0.0).unwrap();
         assert!((plane.gap - 3.0_f64.sqrt()).abs() < 1e-3, "{plane:?}");
         assert!((plane.offset - 1.5 * 3.0_f64.sqrt()).abs() < 1e-3, "{plane:?}");
-        assert!(separating_plane(&cube(0.0), &cube(0.5)).is_none());
+        assert!(separating_plane(&cube(0.0), &cube(0.5), 0.0).is_none());
+    }
+
+    /// Of two cubes of points, each has one point in the other: no plane has all of each on its side.
+    #[test]
+    fn a_few_points_may_lie_beyond_a_dividing_plane() {
+        let side = |k: i32| f64::from(k) / 3.0;
+        let cube = |low: f64| -> Vec<DVec3> {
+            let points = (0..64).map(|k| DVec3::new(side(k & 3), side(k >> 2 & 3), side(k >> 4)) + low);
+            points.chain([DVec3::splat(2.0 - low + 0.5)]).collect()
+        };
+        let (a, b) = (cube(2.0), cube(0.0));
+        assert!(separating_plane(&a, &b, 0.0).is_none());
+        let plane = separating_plane(&a, &b, 0.1).unwrap();
+        let is_wrong = |p: &&DVec3, side: f64| side * (plane.normal.dot(**p) - plane.offset) < 0.0;
+        let n_wrong =
+            [(&a, 1.0), (&b, -1.0)].map(|(of, side)| of.iter().filter(|p| is_wrong(p, side)).count());
+        assert_eq!(n_wrong, [1, 1], "{plane:?}");
     }
 }

@@ -54,6 +54,10 @@ impl Plan<'_> {
                 }
             }
         }
+        let dropped = &self.remedies.dropped;
+        while let Some(i) = (1..self.limbs.len()).find(|&i| dropped.contains(&self.limbs[i].id)) {
+            self.merge(i);
+        }
     }
 
     /// Returns the mirror image of limb `i` if its start, profile and rings are copied from that image.
@@ -179,6 +183,10 @@ impl Plan<'_> {
             let joints = [trunk.point(0.06), top, hem].map(|p| p.with_x(0.0));
             let name = if sign < 0.0 { "cape" } else { "apron" };
             let id = self.n_chains + usize::from(sign < 0.0);
+            if self.remedies.dropped.contains(&id) {
+                self.give_to_legs(&is_low);
+                continue;
+            }
             let mut limb = Limb::new(name.to_owned(), id, joints.to_vec());
             (limb.parent, limb.is_midline, limb.is_symmetric) = (Some(0), true, trunk.is_symmetric);
             (limb.side, limb.first, limb.hole) = (depth, limb.lengths[1], [0.0, 0.08]);
@@ -190,6 +198,19 @@ impl Plan<'_> {
                     sample.limb = index;
                 }
             }
+        }
+    }
+
+    /// Assigns samples of the trunk to the nearest leg.
+    fn give_to_legs(&mut self, is_given: &dyn Fn(DVec3) -> bool) {
+        let legs: Vec<usize> = (1..self.limbs.len())
+            .filter(|&i| self.limbs[i].exit == Exit::Start && self.limbs[i].parent == Some(0))
+            .collect();
+        let limbs = &self.limbs;
+        for sample in self.samples.iter_mut().filter(|sample| sample.limb == 0 && is_given(sample.at)) {
+            let distance = |i: usize| limbs[i].project(sample.at).distance;
+            let nearest = legs.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+            sample.limb = nearest.map_or(0, |leg| leg as u32);
         }
     }
 
@@ -242,7 +263,8 @@ impl Plan<'_> {
             .unwrap_or_else(|| height(&limb.at[1]));
         let past = places.iter().copied().find(|&s| (limb.point(s) - origin).dot(side) >= 0.95 * reach);
         let cap = if lengths.len() > 2 { 0.9 * lengths[2] } else { 0.4 * total };
-        let first = past.unwrap_or(cap).max(inner).min(cap.max(inner)).min(0.6 * total);
+        let further = self.remedies.further.get(&limb.id).copied().unwrap_or(0.0);
+        let first = (past.unwrap_or(cap).max(inner).min(cap.max(inner)) + further).min(0.6 * total);
 
         let own: Vec<DVec3> = self.samples_of(i).collect();
         let mut slab: Vec<(f64, f64, DVec3)> = Vec::new();

@@ -230,6 +230,22 @@ fn legs_that_overlap_get_one_sleeve() {
     assert!(encloses(&sleeves.cage, &figure.positions) && sleeves.mirror == Some(0));
 }
 
+/// A flap of the trunk hangs through both thighs, so no sleeve of its own fits beside those of the legs.
+#[test]
+fn points_that_hang_into_the_legs_belong_to_them() {
+    let mut figure = figure(0.16);
+    let first = figure.positions.len() as u32;
+    for (x, y) in [(-0.2, 0.8), (0.2, 0.8), (-0.2, 0.55), (0.2, 0.55)] {
+        figure.positions.push(Vec3::new(x, y, 0.05));
+        figure.skeleton.chain_of.push(0);
+        figure.skeleton.bone_of.push(0);
+    }
+    figure.triangles.extend([[0, 2, 1], [1, 2, 3]].map(|t| t.map(|v| first + v)));
+    let sleeves = sleeves_of(&figure, 80).unwrap();
+    assert_eq!(sleeves.chains, ["trunk", "leg.L", "leg.R", "arm.L", "arm.R"]);
+    assert!(encloses(&sleeves.cage, &figure.positions) && sleeves.mirror == Some(0));
+}
+
 #[test]
 fn generation_is_cancelled_between_rounds() {
     let figure = figure(0.16);
