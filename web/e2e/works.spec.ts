@@ -110,3 +110,16 @@ test("changed work is saved before another model opens, listed, restored and del
     expect(await savedSince(page, 0, "workA")).toBe(true);
   });
 });
+
+test("a pull is kept when the page is reloaded 50 ms later", async ({ page }) => {
+  await open(page);
+  await work(page, "workA");
+  for (let k = 0; k < 10; k++) {
+    await drag(page, 20 - 4 * k, 10);
+    const posed = await cagePositions(page);
+    await page.evaluate(() => new Promise((done) => setTimeout(done, 50)));
+    await page.reload();
+    await bound(page);
+    expect(largestMove(posed, await cagePositions(page)), `reload ${k}`).toBeLessThan(1e-3);
+  }
+});

@@ -4,13 +4,16 @@ import type { NamedFile } from "../contract";
 import { isFatal } from "../crash";
 import { stem } from "../format";
 import { T } from "../words";
-import { deleteEntry, newId, readEntries, readFile, writeEntry } from "../works/database";
+import { deleteEntry, newId, readEntries, readFile, writeEntry, writeLast } from "../works/database";
 import { ago, type Entry, isExpired, newestFirst, toOpen, type Work } from "../works/entry";
-import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
+import { changedAt, heldIds, hold, ownId, rememberChange, rememberOwn } from "../works/holds";
 import { attempt, type Context } from "./context";
 
-/** Pause after the last change before the work is saved, ms. */
-const PAUSE_MS = 1500;
+/**
+ * Pause after the last change before the work is saved, ms: the shortest, the longest, and its ratio to the time that
+ * the last save took on the main thread. Large models are saved less often.
+ */
+const PAUSE_MS = { least: 50, most: 1500, ratio: 20 };
 /** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
 const MAX_SAVED_BYTES = 200e6;
 
@@ -26,6 +29,8 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const { store } = ctx;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let saving: Promise<void> | undefined;
+  /** Time that the last save took on the main thread, ms. */
+  let cost = 0;
   /** Whether saving the open work has failed. The user has been notified, and the work is not saved again. */
   let hasFailed = false;
   /** Whether the entry of the open work was deleted, and the work has not changed since. */
@@ -47,27 +52,36 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     ctx.tell.say(text, ...(isFull ? [showList] : []));
   };
 
-  const put = async () => {
+  /** Makes the entry and the project file of the open work; undefined if it is too large. */
+  const made = (): { entry: Entry; file: Blob } | undefined => {
+    const began = performance.now();
+    const when = Date.now();
     const name = current?.name ?? store.get().model?.name ?? "";
+    const file = new Blob([write() as BlobPart]);
+    cost = performance.now() - began;
+    if (file.size > MAX_SAVED_BYTES) {
+      hasFailed = true;
+      ctx.tell.say(T.works.large(name, file.size, MAX_SAVED_BYTES));
+      return undefined;
+    }
+    if (!current) {
+      const id = newId();
+      const lock = hold(id);
+      current = { id, name, release: () => void lock.then((release) => release?.()) };
+    }
+    rememberOwn(current.id);
+    return { entry: { id: current.id, name, when, size: file.size }, file };
+  };
+
+  const put = async () => {
     try {
-      const when = Date.now();
-      const file = new Blob([write() as BlobPart]);
-      if (file.size > MAX_SAVED_BYTES) {
-        hasFailed = true;
-        ctx.tell.say(T.works.large(name, file.size, MAX_SAVED_BYTES));
-        return;
-      }
-      if (!current) {
-        const id = newId();
-        current = { id, name, release: (await hold(id)) ?? (() => undefined) };
-      }
-      const { id } = current;
-      await writeEntry({ id, name, when, size: file.size }, file);
-      rememberOwn(id);
-      store.set({ savedAt: when });
+      const work = made();
+      if (!work) return;
+      await writeEntry(work.entry, work.file);
+      store.set({ savedAt: work.entry.when });
       await refresh();
     } catch (error) {
-      fail(error, name);
+      fail(error, current?.name ?? store.get().model?.name ?? "");
     }
   };
 
@@ -82,13 +96,33 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
 
   const touch = () => {
     isUnwanted = false;
+    rememberChange(Date.now());
+    wait();
+  };
+
+  const wait = () => {
     clearTimeout(timer);
+    const pause = Math.min(Math.max(PAUSE_MS.ratio * cost, PAUSE_MS.least), PAUSE_MS.most);
     timer = setTimeout(() => {
       const { bindRun, gesture, playing } = store.get();
-      if (bindRun || gesture || playing) touch();
+      if (bindRun || gesture || playing) wait();
       else void save();
-    }, PAUSE_MS);
+    }, pause);
   };
+
+  /** Saves a pending change while the page is being left. */
+  const saveLast = () => {
+    if (timer === undefined || !hasWork()) return;
+    clearTimeout(timer);
+    timer = undefined;
+    try {
+      const work = made();
+      if (work) writeLast(work.entry, work.file);
+    } catch {
+      // The page that opens next says that the last change is lost.
+    }
+  };
+  globalThis.addEventListener?.("pagehide", saveLast);
 
   const refresh = async () => {
     try {
@@ -155,7 +189,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const showList = { label: T.works.show, run: () => store.set({ worksOpen: true }) };
 
   return {
-    /** Saves the open work after `PAUSE_MS` without a further call, but not during a bind, gesture or animation. */
+    /** Saves the open work shortly after the last call, but not during a bind, gesture or animation. */
     touch,
     /** Saves pending changes, and a model that was never saved, before something else is opened. */
     async flush() {
@@ -201,8 +235,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       // Files that the user dropped in the meantime take precedence.
       if (busy !== null || model !== null) return true;
       const chosen = toOpen(works, ownId());
+      const changed = changedAt();
       if (!chosen || !(await open(chosen, true))) return false;
-      const text = T.works.restored(chosen.name, ago(Date.now() - chosen.when));
+      const isWhole = changed <= chosen.when;
+      const since = ago(Date.now() - chosen.when);
+      const text = isWhole ? T.works.restored(chosen.name, since) : T.works.restoredPart(chosen.name, since);
       const fresh = { label: T.works.fresh, run: startFresh };
       ctx.tell.say(text, works.length > 1 ? showList : fresh);
       return true;

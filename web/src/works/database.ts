@@ -25,22 +25,43 @@ function open(): Promise<IDBDatabase> {
   });
 }
 
+/** The open connection. It stays open, so that a page that is being left can write without waiting for it. */
+let connection: Promise<IDBDatabase> | undefined;
+let connected: IDBDatabase | undefined;
+
+function connect(): Promise<IDBDatabase> {
+  const forget = () => {
+    connection = undefined;
+    connected = undefined;
+  };
+  connection ??= open().then((database) => {
+    connected = database;
+    database.onclose = forget;
+    // Another tab deletes or upgrades the database.
+    database.onversionchange = () => {
+      database.close();
+      forget();
+    };
+    return database;
+  });
+  connection.catch(forget);
+  return connection;
+}
+
 async function run<T>(
   mode: IDBTransactionMode,
   work: (entries: IDBObjectStore, files: IDBObjectStore) => IDBRequest<T>,
 ): Promise<T> {
-  const database = await open();
-  try {
-    return await new Promise<T>((resolve, reject) => {
-      const transaction = database.transaction([ENTRIES, FILES], mode);
-      const request = work(transaction.objectStore(ENTRIES), transaction.objectStore(FILES));
-      transaction.oncomplete = () => resolve(request.result);
-      transaction.onabort = () => reject(transaction.error);
-      transaction.onerror = () => reject(transaction.error);
-    });
-  } finally {
-    database.close();
-  }
+  const database = await connect();
+  return await new Promise<T>((resolve, reject) => {
+    const transaction = database.transaction([ENTRIES, FILES], mode);
+    const request = work(transaction.objectStore(ENTRIES), transaction.objectStore(FILES));
+    // Otherwise the browser drops what is not complete when the page is left.
+    if (mode === "readwrite") transaction.commit();
+    transaction.oncomplete = () => resolve(request.result);
+    transaction.onabort = () => reject(transaction.error);
+    transaction.onerror = () => reject(transaction.error);
+  });
 }
 
 /** Whether any work is saved. False if the browser forbids storage. */
@@ -77,6 +98,17 @@ export async function writeEntry(entry: Entry, file?: Blob): Promise<void> {
     if (file) files.put(file, entry.id);
     return entries.put(entry, entry.id);
   });
+}
+
+/**
+ * Writes an entry and its project file while the page is being left. The browser completes a transaction that is
+ * committed, also after the page is gone. Does nothing if the database is not open.
+ */
+export function writeLast(entry: Entry, file: Blob): void {
+  const transaction = connected?.transaction([ENTRIES, FILES], "readwrite");
+  transaction?.objectStore(FILES).put(file, entry.id);
+  transaction?.objectStore(ENTRIES).put(entry, entry.id);
+  transaction?.commit();
 }
 
 export async function deleteEntry(id: string): Promise<void> {

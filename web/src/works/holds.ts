@@ -7,6 +7,7 @@ import { tryStorage } from "../store";
 
 const PREFIX = "cagework.work.";
 const OWN_KEY = "cagework.work";
+const CHANGED_KEY = "cagework.changed";
 /** Time to wait for a lock, ms. After a reload, the previous page may still hold it. */
 const PATIENCE_MS = 1000;
 
@@ -40,4 +41,14 @@ export function rememberOwn(id: string | null): void {
 /** Reads the id stored by `rememberOwn`. */
 export function ownId(): string | null {
   return tryStorage(() => sessionStorage.getItem(OWN_KEY)) ?? null;
+}
+
+/** Stores the time of the last change in this tab, ms since 1970. */
+export function rememberChange(when: number): void {
+  tryStorage(() => sessionStorage.setItem(CHANGED_KEY, String(when)));
+}
+
+/** Reads the time stored by `rememberChange`; 0 without one. */
+export function changedAt(): number {
+  return Number(tryStorage(() => sessionStorage.getItem(CHANGED_KEY)) ?? 0);
 }

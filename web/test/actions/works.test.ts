@@ -12,6 +12,9 @@ const kept = new Map<string, { entry: Entry; file: Blob | undefined }>();
 const disk: { error: Error | undefined } = { error: undefined };
 let held: string[] = [];
 let own: string | null = null;
+let changed = 0;
+/** Listeners of the page, by event. */
+const listeners = new Map<string, () => void>();
 
 vi.mock("../../src/works/database", () => ({
   newId: () => `work${kept.size}`,
@@ -21,6 +24,7 @@ vi.mock("../../src/works/database", () => ({
     if (disk.error) throw disk.error;
     kept.set(entry.id, { entry, file: file ?? kept.get(entry.id)?.file });
   },
+  writeLast: (entry: Entry, file: Blob) => void kept.set(entry.id, { entry, file }),
   deleteEntry: async (id: string) => void kept.delete(id),
 }));
 vi.mock("../../src/works/holds", () => ({
@@ -36,15 +40,21 @@ vi.mock("../../src/works/holds", () => ({
     own = id;
   },
   ownId: () => own,
+  rememberChange(when: number) {
+    changed = when;
+  },
+  changedAt: () => changed,
 }));
 
 beforeEach(() => {
   vi.useFakeTimers();
+  vi.stubGlobal("addEventListener", (type: string, run: () => void) => listeners.set(type, run));
 });
 afterEach(() => {
   vi.useRealTimers();
   kept.clear();
-  [disk.error, held, own] = [undefined, [], null];
+  [disk.error, held, own, changed] = [undefined, [], null, 0];
+  vi.unstubAllGlobals();
 });
 
 function page({ isEmpty = false } = {}) {
@@ -80,6 +90,32 @@ it("work is saved after a pause without changes, but not during a gesture", asyn
   works.touch();
   await vi.advanceTimersByTimeAsync(2000);
   expect([kept.size, store.get().works[0]?.where]).toEqual([1, "here"]);
+});
+
+it("a change is saved 50 ms later, or at once when the page is left, also during a gesture", async () => {
+  const { works, store } = page();
+  works.touch();
+  await vi.advanceTimersByTimeAsync(49);
+  expect(kept.size).toBe(0);
+  await vi.advanceTimersByTimeAsync(1);
+  expect(kept.size).toBe(1);
+  kept.clear();
+  listeners.get("pagehide")?.();
+  expect(kept.size, "nothing changed").toBe(0);
+  store.set({ gesture: "Move" });
+  works.touch();
+  listeners.get("pagehide")?.();
+  expect(kept.get("work0")?.entry.when).toBe(Date.now());
+});
+
+it("a change that was not kept is named when the work is back", async () => {
+  const { works, said } = page({ isEmpty: true });
+  keep("a", Date.now() - 10);
+  [own, changed] = ["a", Date.now()];
+  await works.restore();
+  expect(said.at(-1)).toMatch(
+    /^Your work on a\.obj is back as it was kept .* last change after that was not kept/,
+  );
 });
 
 it("opening another model saves the previous work and offers it", async () => {

@@ -30,6 +30,8 @@ export const works = {
   back: "Bring it back",
   restored: (name: string, ago: string) =>
     `Your work on ${name} is back as you left it ${ago}. Earlier changes cannot be undone.`,
+  restoredPart: (name: string, ago: string) =>
+    `Your work on ${name} is back as it was kept ${ago}. Your last change after that was not kept.`,
   fresh: "Start fresh",
   moment: "a moment ago",
 };
