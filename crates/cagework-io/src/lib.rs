@@ -20,6 +20,7 @@ mod normals;
 mod npz;
 mod obj;
 mod off;
+mod order;
 mod origin;
 mod part_kind;
 mod ply;

@@ -26,9 +26,10 @@ use thiserror::Error;
 use zip::result::ZipError;
 
 use crate::memory::MemoryError;
+use crate::order::{Budget, Expansion};
 use crate::shown::shown;
 use crate::up::UpAxis;
-use arrays::{Archive, Budget, NpyArray, NpzWriter, array, npy_header, required};
+use arrays::{Archive, NpyArray, NpzWriter, array, npy_header, required};
 
 /// Error of reading a weights file.
 #[derive(Debug, Error)]
@@ -198,7 +199,7 @@ pub fn write_field_npz(field: &Field, origin: DVec3, up: UpAxis) -> Vec<u8> {
 /// # Errors
 /// [`NpzError`] if the file is not an array of this shape.
 pub(crate) fn npy_points(mut bytes: &[u8]) -> Result<(Vec<DVec3>, bool), NpzError> {
-    let mut budget = Budget::new(bytes.len() as u64, u64::MAX);
+    let mut budget = Budget::new(bytes.len() as u64, 0, u64::MAX, Expansion::TEXT);
     NpyArray::read("points", &mut bytes, &mut budget)?.wide_points()
 }
 

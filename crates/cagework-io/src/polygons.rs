@@ -12,6 +12,7 @@ use thiserror::Error;
 
 use crate::memory::{MemoryError, WELD_BYTES};
 use crate::obj::{Corner, Group, Line, MAX_FACE_CORNERS, Material, NONE, PolygonDocument, shown_token};
+use crate::order::Refusal;
 use crate::origin::{origin_near, relative};
 
 /// Error of reading a PLY, STL, OFF or 3MF file.
@@ -80,6 +81,16 @@ pub enum PolygonsError {
     Memory(#[from] MemoryError),
 }
 
+impl From<Refusal> for PolygonsError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Memory(error) => error.into(),
+            Refusal::Unpacked(problem) => Self::Syntax(problem),
+            Refusal::Count { what, count, limit } => Self::TooMany { count, what, limit },
+        }
+    }
+}
+
 /// How a file encodes numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Encoding {
@@ -129,8 +140,13 @@ impl Polygons {
         corners: u64,
         limit: u64,
     ) -> Result<u64, MemoryError> {
-        let needed = bytes + vertices * (120 + WELD_BYTES) + corners * 48;
+        let needed = bytes + Self::bytes_of(vertices, corners);
         MemoryError::check(needed, limit).map(|()| needed)
+    }
+
+    /// Estimates the memory of a triangle mesh, bytes.
+    pub(crate) fn bytes_of(vertices: u64, corners: u64) -> u64 {
+        vertices * (120 + WELD_BYTES) + corners * 48
     }
 
     /// Stores the positions; with `near`, relative to an origin near them.

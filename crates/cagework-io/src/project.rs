@@ -94,13 +94,13 @@ pub fn write_project(
                 }
                 _ => model.write(ModelFormat::Gltf, &model.positions)?,
             };
-            built = gltf::read_written(&model.name, &glb, model.origin)?.document;
+            built = gltf::document_written(&model.name, &glb)?;
             (&built, Some(file_of(model)?))
         }
         Document::Polygons(document) => {
             let (glb, _) =
                 gltf::build_from_obj(&model.name, document, &model.positions_in_file(), model.origin)?;
-            built = gltf::read_written(&model.name, &glb, model.origin)?.document;
+            built = gltf::document_written(&model.name, &glb)?;
             (&built, Some(file_of(model)?))
         }
     };

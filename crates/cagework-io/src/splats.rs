@@ -11,6 +11,7 @@ use glam::{DVec3, Quat, Vec3};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
+use crate::order::{Budget, Order, Permit, Price, Refusal};
 use crate::polygons::Polygons;
 
 /// Factor between the coefficient of band 0 and a colour: 1 / (2 sqrt(pi)).
@@ -117,20 +118,53 @@ pub(crate) struct RawSplats {
     pub(crate) positions: Vec<DVec3>,
 }
 
-impl RawSplats {
-    /// Reserves memory for `count` splats.
+/// Splats that a header declares.
+#[derive(Default)]
+pub(crate) struct SplatOrder {
+    /// Other counts with their names and limits.
+    pub(crate) counts: Vec<(&'static str, u64, u64)>,
+    pub(crate) count: u64,
+    /// Degree of the spherical harmonics.
+    pub(crate) degree: u8,
+    /// Bytes that the streams of the splats unpack to, and memory of their decoder.
+    pub(crate) unpacked: u64,
+    pub(crate) window: u64,
+}
+
+impl SplatOrder {
+    /// Prices the splats.
     ///
     /// # Errors
-    /// [`MemoryError`] if splats and the `held` bytes need more than the limit.
-    pub(crate) fn new(count: u64, degree: u8, held: u64, limit: u64) -> Result<Self, SplatError> {
-        if count == 0 {
-            return Err(SplatError::Empty);
-        }
+    /// [`SplatError`] if there are none, or they exceed a limit of `budget`.
+    pub(crate) fn permit(self, budget: &mut Budget) -> Result<Permit<Self>, SplatError> {
+        if self.count == 0 { Err(SplatError::Empty) } else { Ok(budget.permit(self)?) }
+    }
+}
+
+impl Order for SplatOrder {
+    fn price(&self) -> Price {
         // The positions are in memory three times: as read, in the splats and in the model.
-        let each = Splats::bytes_per_splat(degree) + (size_of::<DVec3>() + size_of::<Vec3>()) as u64;
-        MemoryError::check(held.saturating_add(count.saturating_mul(each)), limit)?;
-        // Reserve the full capacity: a vector that doubles to grow would exceed the estimate.
-        let count = count as usize;
+        let each = Splats::bytes_per_splat(self.degree) + (size_of::<DVec3>() + size_of::<Vec3>()) as u64;
+        let bytes = [self.count.saturating_mul(each), self.unpacked, self.window];
+        let bytes = bytes.into_iter().fold(0, u64::saturating_add);
+        Price { counts: self.counts.clone(), unpacked: self.unpacked, bytes }
+    }
+}
+
+impl From<Refusal> for SplatError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Memory(error) => error.into(),
+            other => Self::Damaged(other.to_string()),
+        }
+    }
+}
+
+impl RawSplats {
+    /// Reserves memory for the splats of an order. The full capacity is reserved: a vector that doubles to grow would
+    /// exceed the estimate.
+    pub(crate) fn new(permit: &Permit<SplatOrder>) -> Self {
+        let (count, degree) = (permit.count as usize, permit.degree);
         let splats = Splats {
             degree,
             positions: Vec::new(),
@@ -140,7 +174,7 @@ impl RawSplats {
             colors: Vec::with_capacity(count),
             harmonics: Vec::with_capacity(count * cagework_core::splats::n_harmonics(degree)),
         };
-        Ok(Self { splats, positions: Vec::with_capacity(count) })
+        Self { splats, positions: Vec::with_capacity(count) }
     }
 
     /// Checks all numbers and normalises rotations. `near`: store positions relative to an origin near them.

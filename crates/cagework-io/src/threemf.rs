@@ -40,7 +40,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let mut palette = Palette::default();
     for instance in &scene.instances {
         let first_face = read.face_starts.len() as u32 - 1;
-        read.groups.push(Group { is_object: true, name: instance.name.clone(), first_face });
+        read.groups.push(Group { is_object: true, name: scene.name(instance).to_owned(), first_face });
         let object = scene.object(instance.object);
         let is_mirrored = instance.transform.matrix3.determinant() < 0.0;
         for (t, triangle) in object.triangles.iter().enumerate() {

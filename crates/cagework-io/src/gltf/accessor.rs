@@ -11,6 +11,7 @@ use ::gltf::json::validation::Checked;
 use cagework_core::words::counted;
 
 use super::{GltfError, get};
+use crate::order::Permit;
 
 /// Limit on the elements of an accessor and on the vertices of a model. A model of this size takes about 1 GB to read
 /// and weld.
@@ -26,8 +27,35 @@ const MAX_IMPLICIT_ZEROS: u64 = 1 << 20;
 /// A document and its buffers, from which accessors are read.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
-    pub(crate) root: &'a Root,
-    pub(crate) buffers: &'a [Arc<Vec<u8>>],
+    root: &'a Root,
+    buffers: &'a [Arc<Vec<u8>>],
+}
+
+/// Number of elements that an accessor declares.
+///
+/// # Errors
+/// If the accessor does not exist or has too many implicit zeros.
+pub(super) fn count(root: &Root, accessor: u32) -> Result<u64, GltfError> {
+    let a = get(&root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
+    let absent = count_absent(root, accessor);
+    if absent > MAX_IMPLICIT_ZEROS {
+        return Err(fault(
+            accessor,
+            format!(
+                "has {absent} elements without data in the file, more than the limit of {MAX_IMPLICIT_ZEROS}"
+            ),
+        ));
+    }
+    Ok(a.count.0)
+}
+
+/// Number of implicit zeros; 0 if the accessor does not exist.
+pub(super) fn count_absent(root: &Root, accessor: u32) -> u64 {
+    let without_view = |a: &&Accessor| a.buffer_view.is_none();
+    root.accessors
+        .get(accessor as usize)
+        .filter(without_view)
+        .map_or(0, |a| a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)))
 }
 
 /// Type of a component: `f32`, or an integer that is converted as is or normalised.
@@ -75,6 +103,11 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Source<'a> {
+    /// A source of the values that `_permit` covers.
+    pub(crate) fn new<T>(root: &'a Root, buffers: &'a [Arc<Vec<u8>>], _permit: &Permit<T>) -> Self {
+        Self { root, buffers }
+    }
+
     /// Reads vectors of `N` floats. `what` names the attribute in errors.
     pub(crate) fn floats<const N: usize>(
         self,
@@ -101,32 +134,9 @@ impl<'a> Source<'a> {
         self.read(accessor, what, kind, 0, |bytes| unsigned(kind, bytes))
     }
 
-    /// Number of elements.
-    ///
-    /// # Errors
-    /// If the accessor does not exist or has too many implicit zeros.
+    /// Number of elements, as [`count`].
     pub(crate) fn count(self, accessor: u32) -> Result<u64, GltfError> {
-        let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
-        let absent = self.count_absent(accessor);
-        if absent > MAX_IMPLICIT_ZEROS {
-            return Err(fault(
-                accessor,
-                format!(
-                    "has {absent} elements without data in the file, more than the limit of {MAX_IMPLICIT_ZEROS}"
-                ),
-            ));
-        }
-        Ok(a.count.0)
-    }
-
-    /// Number of implicit zeros; 0 if the accessor does not exist.
-    pub(crate) fn count_absent(self, accessor: u32) -> u64 {
-        let without_view = |a: &&Accessor| a.buffer_view.is_none();
-        self.root
-            .accessors
-            .get(accessor as usize)
-            .filter(without_view)
-            .map_or(0, |a| a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)))
+        count(self.root, accessor)
     }
 
     /// Upper bound on the number of non-zero elements. Reads the stored bytes and allocates nothing; every sparse value
@@ -279,17 +289,4 @@ fn type_of(components: usize) -> Type {
 
 fn fault(accessor: u32, problem: String) -> GltfError {
     GltfError::Accessor { accessor, problem }
-}
-
-/// Checks the number of values that are decoded before `size::check`, while compressed geometry is unpacked.
-///
-/// # Errors
-/// [`GltfError::TooLarge`].
-#[cfg(feature = "decompress")]
-pub(super) fn check_values(count: u64) -> Result<(), GltfError> {
-    if count <= MAX_DECODED_VALUES {
-        return Ok(());
-    }
-    let what = "values of accessors that share compressed geometry";
-    Err(GltfError::TooLarge { what, count, limit: MAX_DECODED_VALUES })
 }

@@ -19,6 +19,7 @@ use super::root::DRACO;
 use super::root::{MESHOPT, typed, view_bytes};
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
+use crate::order::{Budget, Expansion, Order, Price};
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start, without_byte_order_mark};
 use crate::siblings::{IMAGE_FAULT, Image, Resolve, SiblingError, Siblings};
 
@@ -58,9 +59,8 @@ pub(crate) fn load(
 ) -> Result<GltfContents, GltfError> {
     let (json, bin) = split(bytes)?;
     let of_json = bytes_of_json(&json);
-    MemoryError::check(of_json + decoded_bytes(&json) + bytes.len() as u64, memory_limit)?;
     let text = bin.is_some().then(|| json.to_vec());
-    let mut json = parsed(&json)?;
+    let mut json = parsed(&json, bytes.len() as u64, memory_limit)?;
     check_version(&json)?;
     write_integers(&mut json, false);
     #[cfg(not(feature = "decompress"))]
@@ -78,8 +78,10 @@ pub(crate) fn load(
     #[cfg(feature = "decompress")]
     let buffers = {
         let mut buffers = buffers;
-        let held = of_json + bytes.len() as u64 + distinct_bytes(&buffers);
-        super::decompress::decompress(name, &mut json, &mut buffers, (held, memory_limit))?;
+        let in_buffers = distinct_bytes(&buffers);
+        let (file, held) = (in_buffers.max(bytes.len() as u64), of_json + bytes.len() as u64 + in_buffers);
+        let budget = Budget::new(file, held, memory_limit, Expansion::GEOMETRY);
+        super::decompress::decompress(name, &mut json, &mut buffers, budget)?;
         buffers
     };
     let is_decoded = buffers.len() > n_in_file;
@@ -104,8 +106,7 @@ fn distinct_bytes<'a>(all: impl IntoIterator<Item = &'a Arc<Vec<u8>>>) -> u64 {
 /// Names of external buffers and images; empty if the file cannot be read.
 pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     let Ok((json, _)) = split(bytes) else { return Vec::new() };
-    let fits = MemoryError::check(bytes_of_json(&json) + bytes.len() as u64, memory_limit).is_ok();
-    let json = if fits { parsed(&json).unwrap_or_default() } else { Value::Null };
+    let json = parsed(&json, bytes.len() as u64, memory_limit).unwrap_or_default();
     let items = ["buffers", "images"].into_iter().filter_map(|list| json[list].as_array()).flatten();
     let uris = items.filter_map(|item| item["uri"].as_str()).filter(|uri| !is_data(uri));
     uris.map(|uri| decoded(uri).into_owned()).collect()
@@ -225,12 +226,20 @@ struct Lists {
     cameras: Vec<IgnoredAny>,
 }
 
-fn parsed(json: &[u8]) -> Result<Value, GltfError> {
-    let (count, limit) =
-        (values_of_json(json), MAX_JSON_VALUES.max(json.len() as u64 / BYTES_PER_JSON_VALUE));
-    if count > limit {
-        return Err(GltfError::TooLarge { what: "values in the JSON", count, limit });
+/// The text of a document.
+struct JsonText<'a>(&'a [u8]);
+
+impl Order for JsonText<'_> {
+    fn price(&self) -> Price {
+        let limit = MAX_JSON_VALUES.max(self.0.len() as u64 / BYTES_PER_JSON_VALUE);
+        let counts = vec![("values in the JSON", values_of_json(self.0), limit)];
+        Price { counts, bytes: bytes_of_json(self.0) + decoded_bytes(self.0), unpacked: 0 }
     }
+}
+
+/// Parses the JSON of a document. `held`: memory in use, bytes.
+fn parsed(json: &[u8], held: u64, memory_limit: u64) -> Result<Value, GltfError> {
+    Budget::new(held, held, memory_limit, Expansion::TEXT).permit(JsonText(json))?;
     let fault = |e: serde_json::Error| GltfError::Json(json_fault(json, &e));
     // Lists are counted before values are built, because an object takes up to 600 bytes.
     let lists: Lists = serde_json::from_slice(json).map_err(fault)?;
@@ -254,8 +263,7 @@ fn parsed(json: &[u8]) -> Result<Value, GltfError> {
 /// Splits a GLB into its JSON and its binary chunk, without loading external files.
 pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u8>), GltfError> {
     let (json, bin) = split(bytes)?;
-    MemoryError::check(bytes_of_json(&json) + 2 * bytes.len() as u64, memory_limit)?;
-    let json = parsed(&json)?;
+    let json = parsed(&json, 2 * bytes.len() as u64, memory_limit)?;
     check_version(&json)?;
     Ok((json, bin.map(Cow::into_owned).unwrap_or_default()))
 }

@@ -17,46 +17,21 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Workspace};
 use serde_json::{Map, Value, json};
 
-use super::accessor::{MAX_ELEMENTS, Source, check_values};
+use super::GltfError;
+use super::accessor::{MAX_DECODED_VALUES, MAX_ELEMENTS, Source};
 use super::pack::{INDICES, VERTICES, bounds, push};
 use super::root::{DRACO, MESHOPT, typed};
-use super::{GltfError, MemoryError};
-
-/// Limit on the decompressed size of all streams, bytes. A file of a few hundred bytes can claim any size.
-const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
+use crate::order::{Budget, Order, Permit, Price, Refusal, Stream};
 
 /// If the joint weights of a vertex sum to 1 within this tolerance, they are not rescaled, because the difference comes
 /// from rounding to f32.
 const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
-/// Bytes of four values of a vertex while weights are corrected.
-const VALUE_BYTES: u64 = 16;
+/// Memory of four joints and weights of a vertex, bytes: while they are corrected, and as stored.
+const WEIGHTS_READ_BYTES: u64 = 32;
+const WEIGHTS_STORED_BYTES: u64 = 24;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
-
-/// Memory of the decompressed geometry. Bytes are taken before they are decoded or copied.
-struct Budget {
-    /// Bytes of the document and of the buffers in the file.
-    held: u64,
-    taken: u64,
-    memory_limit: u64,
-}
-
-impl Budget {
-    fn check(&self, bytes: u64) -> Result<(), Fault> {
-        let taken = self.taken.saturating_add(bytes);
-        if taken > MAX_DECOMPRESSED_BYTES {
-            return Err(too_large());
-        }
-        Ok(MemoryError::check(self.held.saturating_add(taken), self.memory_limit)?)
-    }
-
-    fn take(&mut self, bytes: u64) -> Result<(), Fault> {
-        self.check(bytes)?;
-        self.taken += bytes;
-        Ok(())
-    }
-}
 
 /// Why geometry cannot be decompressed.
 enum Fault {
@@ -78,19 +53,89 @@ impl From<&str> for Fault {
     }
 }
 
-impl From<MemoryError> for Fault {
-    fn from(error: MemoryError) -> Self {
-        Self::Limit(error.into())
+impl From<Refusal> for Fault {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Unpacked(problem) => Self::Stream(problem),
+            other => Self::Limit(other.into()),
+        }
     }
 }
 
-fn too_large() -> Fault {
-    Fault::Stream(format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20))
+/// A meshopt stream, as its buffer view declares it.
+struct MeshoptStream<'a> {
+    source: &'a [u8],
+    count: usize,
+    stride: usize,
+    mode: &'a str,
+    filter: &'a str,
+}
+
+impl<'a> MeshoptStream<'a> {
+    fn of(packed: &'a Value, buffers: &'a Buffers) -> Result<Self, Fault> {
+        let number = |key: &str| packed[key].as_u64().and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
+        Ok(Self {
+            source: bytes_of(packed, buffers).ok_or("its stream is cut off")?,
+            count: number("count"),
+            stride: number("byteStride"),
+            mode: packed["mode"].as_str().unwrap_or_default(),
+            filter: packed["filter"].as_str().unwrap_or("NONE"),
+        })
+    }
+}
+
+impl Order for MeshoptStream<'_> {
+    fn price(&self) -> Price {
+        let bytes = (self.count as u64).saturating_mul(self.stride.max(1) as u64);
+        Price { unpacked: bytes, bytes, ..Price::default() }
+    }
+}
+
+/// A Draco stream. Only the primitives that use it declare its size: the attributes of the stream follow its
+/// connectivity, which has to be decoded first. The decoder stops at the bytes of the permit.
+struct DracoStream<'a> {
+    source: &'a [u8],
+    /// Bytes of the accessors of all attributes and of the indices.
+    bytes: u64,
+}
+
+impl<'a> DracoStream<'a> {
+    /// `primitives`: JSON pointer and extension of each primitive that uses the stream of buffer view `view`.
+    fn of(
+        json: &Value,
+        buffers: &'a Buffers,
+        view: u64,
+        primitives: &[(String, Value)],
+    ) -> Result<Self, Fault> {
+        let source = json["bufferViews"].get(view as usize).and_then(|view| bytes_of(view, buffers));
+        let count = |accessor: &Value| {
+            let accessor = accessor.as_u64().and_then(|number| json["accessors"].get(number as usize));
+            accessor.and_then(|accessor| accessor["count"].as_u64()).unwrap_or(0)
+        };
+        // Every attribute takes at least 4 bytes per point, as glTF aligns them.
+        let mut attributes: BTreeMap<u64, u64> = BTreeMap::new();
+        let mut indices = 0;
+        for (place, packed) in primitives {
+            let Some(primitive) = json.pointer(place) else { continue };
+            indices = count(&primitive["indices"]).max(indices);
+            for (name, id) in packed["attributes"].as_object().into_iter().flatten() {
+                let most = attributes.entry(id.as_u64().unwrap_or(0)).or_default();
+                *most = count(&primitive["attributes"][name]).max(*most);
+            }
+        }
+        let n = attributes.into_values().fold(indices, u64::saturating_add);
+        Ok(Self { source: source.ok_or("its stream is cut off")?, bytes: n.saturating_mul(4) })
+    }
+}
+
+impl Order for DracoStream<'_> {
+    fn price(&self) -> Price {
+        Price { unpacked: self.bytes, bytes: self.bytes, ..Price::default() }
+    }
 }
 
 /// Decodes all compressed geometry, appending buffers to `buffers` and the document. Each stream is decoded once.
-/// `name`: name of the file. `held`: bytes of the document and its buffers; `memory_limit`: limit on these and the
-/// decoded bytes.
+/// `name`: name of the file.
 ///
 /// # Errors
 /// [`GltfError::Compressed`], [`GltfError::Memory`], [`GltfError::TooLarge`].
@@ -98,10 +143,9 @@ pub(super) fn decompress(
     name: &str,
     json: &mut Value,
     buffers: &mut Buffers,
-    (held, memory_limit): (u64, u64),
+    mut budget: Budget,
 ) -> Result<(), GltfError> {
     let n_in_file = buffers.len();
-    let mut budget = Budget { held, taken: 0, memory_limit };
     let fault = |extension| {
         move |fault| match fault {
             Fault::Stream(problem) => {
@@ -110,17 +154,17 @@ pub(super) fn decompress(
             Fault::Limit(error) => error,
         }
     };
-    let mut last = DRACO;
     for extension in MESHOPT {
         for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
             let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
-            let bytes = meshopt(&packed, buffers, &mut budget).map_err(fault(extension))?;
+            let bytes =
+                MeshoptStream::of(&packed, buffers).and_then(|stream| meshopt(&budget.permit(stream)?));
+            let bytes = bytes.map_err(fault(extension))?;
             let length = bytes.len();
             let buffer = push_buffer(json, buffers, bytes);
             let view = &mut json["bufferViews"][number];
             (view["buffer"], view["byteOffset"], view["byteLength"]) =
                 (buffer.into(), 0.into(), length.into());
-            last = extension;
         }
     }
     // Primitives by the buffer view of their stream.
@@ -139,9 +183,9 @@ pub(super) fn decompress(
     if buffers.len() > n_in_file {
         // A document that cannot be parsed is reported when it is read.
         if let Ok(root) = typed(json) {
-            check_corrections(&root, n_in_file)?;
-            correct_bounds(json, &root, buffers, n_in_file);
-            normalise_weights(json, &root, buffers, n_in_file, &mut budget).map_err(fault(last))?;
+            let permit = budget.permit(Corrections::of(&root, n_in_file))?;
+            correct_bounds(json, &root, buffers, &permit);
+            normalise_weights(json, &root, buffers, &permit);
         }
     }
     let Some(document) = json.as_object_mut() else { return Ok(()) };
@@ -165,24 +209,6 @@ fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)
     root.accessors.iter().enumerate().filter(move |(_, accessor)| is_decoded(accessor))
 }
 
-/// Checks the number of values that [`correct_bounds`] and [`normalise_weights`] read: any number of accessors can share
-/// the decoded bytes.
-///
-/// # Errors
-/// [`GltfError::TooLarge`].
-fn check_corrections(root: &Root, first: usize) -> Result<(), GltfError> {
-    let width = |accessor: &Accessor| match &accessor.type_ {
-        Checked::Valid(kind) => kind.multiplicity() as u64,
-        Checked::Invalid => 0,
-    };
-    let values = |accessor: &Accessor| accessor.count.0.saturating_mul(width(accessor));
-    let bounded = decoded(root, first).filter(|(_, a)| a.min.is_some() || a.max.is_some());
-    let of_bounds = bounded.map(|(_, accessor)| values(accessor)).fold(0, u64::saturating_add);
-    let weighted = weight_sets(root, first).into_iter().flatten().flat_map(<[usize; 2]>::from);
-    let accessors = weighted.filter_map(|number| root.accessors.get(number));
-    check_values(accessors.map(values).fold(of_bounds, u64::saturating_add))
-}
-
 /// Accessors of joints and of weights for each set of a vertex.
 type WeightSets = Vec<(usize, usize)>;
 
@@ -200,18 +226,66 @@ fn weight_sets(root: &Root, first: usize) -> Vec<WeightSets> {
         .collect()
 }
 
+/// What [`correct_bounds`] and [`normalise_weights`] read: any number of accessors can share the decoded bytes.
+struct Corrections {
+    /// Decoded accessors with bounds.
+    bounded: Vec<usize>,
+    weights: Vec<WeightSets>,
+    /// Values of all these accessors.
+    values: u64,
+    /// Memory that the corrections take at most, bytes.
+    bytes: u64,
+}
+
+impl Corrections {
+    /// `first`: index of the first decoded buffer.
+    fn of(root: &Root, first: usize) -> Self {
+        let count = |number: usize| root.accessors.get(number).map_or(0, |accessor| accessor.count.0);
+        let width = |accessor: &Accessor| match &accessor.type_ {
+            Checked::Valid(kind) => kind.multiplicity() as u64,
+            Checked::Invalid => 0,
+        };
+        let values_of = |accessor: &Accessor| accessor.count.0.saturating_mul(width(accessor));
+        let add = |sum: u64, n: u64| sum.saturating_add(n);
+        let is_bounded =
+            |(_, accessor): &(usize, &Accessor)| accessor.min.is_some() || accessor.max.is_some();
+        let bounded = || decoded(root, first).filter(is_bounded);
+        let weights = weight_sets(root, first);
+        let weighted = weights.iter().flatten().flat_map(|&(joints, weights)| [joints, weights]);
+        let weighted = weighted.filter_map(|number| root.accessors.get(number)).map(values_of);
+        let of_bounds = || bounded().map(|(_, accessor)| values_of(accessor));
+        let largest = of_bounds().max().unwrap_or(0).saturating_mul(4);
+        let vertices = |sets: &WeightSets| {
+            sets.iter().map(|&(joints, weights)| count(joints).max(count(weights))).fold(0, add)
+        };
+        let read = weights.iter().map(vertices).max().unwrap_or(0).saturating_mul(WEIGHTS_READ_BYTES);
+        let stored = weights.iter().map(vertices).fold(0, add).saturating_mul(WEIGHTS_STORED_BYTES);
+        Self {
+            values: of_bounds().chain(weighted).fold(0, add),
+            bytes: largest.max(read).saturating_add(stored),
+            bounded: bounded().map(|(number, _)| number).collect(),
+            weights,
+        }
+    }
+}
+
+impl Order for Corrections {
+    fn price(&self) -> Price {
+        let what = "values of accessors that share compressed geometry";
+        Price { counts: vec![(what, self.values, MAX_DECODED_VALUES)], bytes: self.bytes, unpacked: 0 }
+    }
+}
+
 /// Recomputes the bounds `min` and `max`, because decoding a quantised stream does not return exactly the values that
 /// they were computed from. glTF requires bounds for positions and times.
-fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize) {
+fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, permit: &Permit<Corrections>) {
     let mut plain = root.clone();
     plain.accessors.iter_mut().for_each(|accessor| accessor.normalized = false);
-    let source = Source { root: &plain, buffers };
-    for (number, _) in decoded(root, first) {
+    let source = Source::new(&plain, buffers, permit);
+    for &number in &permit.bounded {
         let Some(of_json) = json["accessors"][number].as_object_mut() else { continue };
-        let had = [of_json.shift_remove("min"), of_json.shift_remove("max")];
-        if had.iter().all(Option::is_none) {
-            continue;
-        }
+        of_json.shift_remove("min");
+        of_json.shift_remove("max");
         let number = number as u32;
         let vectors = source.floats::<3>(number, "").map(|all| bounds(&all)).ok();
         let found = vectors.or_else(|| source.floats::<1>(number, "").map(|all| bounds(&all)).ok());
@@ -224,18 +298,9 @@ fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize
 
 /// Scales joint weights to a sum of 1, and sets joints with weight 0 to joint 0, as glTF requires. The encoder's
 /// rounding can change the sums and make small weights 0.
-fn normalise_weights(
-    json: &mut Value,
-    root: &Root,
-    buffers: &mut Buffers,
-    first: usize,
-    budget: &mut Budget,
-) -> Result<(), Fault> {
-    for sets in weight_sets(root, first) {
-        let count = |accessor: usize| root.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
-        let vertices = sets.iter().map(|&(joints, weights)| count(joints).saturating_add(count(weights)));
-        budget.check(vertices.fold(0, u64::saturating_add).saturating_mul(VALUE_BYTES))?;
-        let source = Source { root, buffers };
+fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, permit: &Permit<Corrections>) {
+    for sets in &permit.weights {
+        let source = Source::new(root, buffers, permit);
         let read = |&(joints, weights): &(usize, usize)| {
             let joints = source.unsigned::<4>(joints as u32, "joints").ok()?;
             let weights = source.floats::<4>(weights as u32, "joint weights").ok()?;
@@ -260,7 +325,6 @@ fn normalise_weights(
         }
         for ((joints, weights), (new_joints, new_weights)) in sets.iter().zip(values) {
             let n = new_weights.len();
-            budget.take(n as u64 * (8 * u64::from(is_named) + VALUE_BYTES * u64::from(is_off)))?;
             if is_named {
                 let bytes = new_joints.iter().flatten().flat_map(|&joint| (joint as u16).to_le_bytes());
                 put_vertices(json, buffers, *joints, bytes.collect(), UNSIGNED_SHORT, n);
@@ -271,7 +335,6 @@ fn normalise_weights(
             }
         }
     }
-    Ok(())
 }
 
 /// Replaces the values of a four-component accessor of `n` vertices. `bytes`: the new values, little-endian, of the
@@ -319,15 +382,11 @@ fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
     buffers.get(number("buffer")?)?.get(start..start.checked_add(number("byteLength")?)?)
 }
 
-fn meshopt(packed: &Value, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
-    let number =
-        |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_DECOMPRESSED_BYTES).map_or(0, |n| n as usize);
-    let source = bytes_of(packed, buffers).ok_or("its stream is cut off")?;
-    budget.take((number("count") as u64).saturating_mul(number("byteStride") as u64))?;
-    let (count, stride, work) = (number("count"), number("byteStride"), &mut Workspace::default());
-    let filter = packed["filter"].as_str().unwrap_or("NONE");
+fn meshopt(stream: &Permit<MeshoptStream<'_>>) -> Result<Vec<u8>, Fault> {
+    let MeshoptStream { source, count, stride, filter, .. } = **stream;
+    let work = &mut Workspace::default();
     let mut decode = || {
-        let mode = Mode::parse(packed["mode"].as_str().unwrap_or_default())?;
+        let mode = Mode::parse(stream.mode)?;
         if mode != Mode::Attributes {
             return BufferView::new(mode, Filter::parse(filter)?, count, stride)?.decode(source, work);
         }
@@ -356,15 +415,19 @@ fn draco(
     primitives: &[(String, Value)],
     budget: &mut Budget,
 ) -> Result<(), Fault> {
-    let source = json["bufferViews"].get(view as usize).and_then(|view| bytes_of(view, buffers));
+    let order = budget.permit(DracoStream::of(json, buffers, view, primitives)?)?;
+    let most = order.bytes.saturating_add(budget.left());
     let limits = DecodeLimits::default()
         .with_max_points(MAX_ELEMENTS)
         .with_max_faces(2 * MAX_ELEMENTS)
-        .with_max_decoded_bytes(MAX_DECOMPRESSED_BYTES.saturating_sub(budget.taken));
-    let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
+        .with_max_decoded_bytes(most);
+    let mut stream = DecoderBuffer::new(order.source).with_limits(limits);
     let mut mesh = Mesh::new();
     MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| match error.kind() {
-        ErrorKind::LimitExceeded => too_large(),
+        ErrorKind::LimitExceeded => Fault::from(format!(
+            "it unpacks to more than {} MiB, or more than {MAX_ELEMENTS} points: save it again",
+            most >> 20
+        )),
         _ => "its stream is damaged or has an unsupported version".into(),
     })?;
     // glTF aligns vertex attributes to 4 bytes. All attributes count, also those that no primitive uses, because each
@@ -372,7 +435,8 @@ fn draco(
     let stride = |attribute: &PointAttribute| element_size(attribute).next_multiple_of(4);
     let strides: usize = (0..mesh.num_attributes()).map(|a| stride(mesh.attribute(a))).sum();
     let [points, faces] = [mesh.num_points(), mesh.num_faces()].map(|n| n as u64);
-    budget.take(points.saturating_mul(strides.max(4) as u64).saturating_add(12 * faces))?;
+    let found = points.saturating_mul(strides.max(4) as u64).saturating_add(12 * faces);
+    budget.permit(Stream { unpacked: found.saturating_sub(order.bytes), copies: 1 })?;
 
     let mut views: HashMap<u32, usize> = HashMap::new();
     let mut of_indices = None;

@@ -22,7 +22,7 @@ pub(crate) struct Geometry {
 
 impl GltfDocument {
     pub(crate) fn source(&self) -> Source<'_> {
-        Source { root: &self.root, buffers: &self.buffers }
+        Source::new(&self.root, &self.buffers, &self.permit)
     }
 
     /// Default weights of an instance's morph targets: those of its node, otherwise those of its mesh.

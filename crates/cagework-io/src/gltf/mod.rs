@@ -38,11 +38,14 @@ use thiserror::Error;
 
 use crate::counts::Counts;
 use crate::memory::MemoryError;
+use crate::order::{Permit, Refusal};
 use crate::origin::origin_near;
 use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use crate::splats::{RawSplats, SplatError};
+use container::GltfContents;
 use scene::{Instance, Worlds};
+use size::DocumentSize;
 
 pub(crate) use accessor::MAX_ELEMENTS;
 pub(crate) use animate::{Pose, PoseClip};
@@ -222,6 +225,16 @@ impl GltfError {
     }
 }
 
+impl From<Refusal> for GltfError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Memory(error) => error.into(),
+            Refusal::Unpacked(problem) => Self::Container(problem),
+            Refusal::Count { what, count, limit } => Self::TooLarge { what, count, limit },
+        }
+    }
+}
+
 /// A parsed glTF file.
 #[derive(Clone, Debug)]
 pub(crate) struct GltfDocument {
@@ -250,6 +263,16 @@ pub(crate) struct GltfDocument {
     pub(crate) bytes: u64,
     /// The triangle primitives of `instances`, with their ranges of vertices and triangles.
     slots: Vec<Slot>,
+    /// Permit to read the accessors.
+    permit: Permit<DocumentSize>,
+}
+
+/// A loaded file of which only counts are known. Its accessors can be read after it is priced.
+struct Headers {
+    loaded: GltfContents,
+    worlds: Worlds,
+    instances: Vec<Instance>,
+    elsewhere: Vec<Instance>,
 }
 
 /// Range of vertices and triangles that one primitive of one instance has in the model.
@@ -347,6 +370,7 @@ impl GltfDocument {
             joints: Vec::new(),
             bytes,
             slots: slots.collect(),
+            permit: Permit::of_own_document(),
         };
         document.joints = skin::shown_joints(&document, &worlds)?;
         Ok(document)
@@ -362,8 +386,17 @@ pub(crate) struct GltfModel {
     pub(crate) document: GltfDocument,
     pub(crate) counts: Counts,
     pub(crate) notices: Vec<String>,
-    /// Splats of a file without triangles. All other members except the notices are empty.
-    pub(crate) splats: Option<(RawSplats, String)>,
+}
+
+/// What a file shows.
+pub(crate) enum GltfContent {
+    Model(Box<GltfModel>),
+    /// Splats of a file without triangles.
+    Splats {
+        splats: Box<RawSplats>,
+        color_space: String,
+        notices: Vec<String>,
+    },
 }
 
 /// Reads a glTF or GLB file using at most `memory_limit` bytes. `resolve` returns external files by decoded
@@ -376,24 +409,15 @@ pub(crate) fn read(
     memory_limit: u64,
     origin: Option<DVec3>,
     clips_alone: bool,
-) -> Result<GltfModel, GltfError> {
+) -> Result<GltfContent, GltfError> {
     let mut notices = Vec::new();
-    let (mut document, worlds) = parse(name, bytes, resolve, memory_limit, &mut notices)?;
-    let loaded_bytes = document.bytes;
-    if let Some(splats) = splats::read(&document, loaded_bytes, memory_limit)? {
-        return Ok(GltfModel {
-            origin: DVec3::ZERO,
-            positions: Vec::new(),
-            triangles: Vec::new(),
-            document,
-            counts: Counts::default(),
-            notices,
-            splats: Some(splats),
-        });
+    let headers = Headers::read(name, bytes, resolve, memory_limit, &mut notices)?;
+    if let Some((splats, color_space)) = splats::read(&headers, memory_limit)? {
+        return Ok(GltfContent::Splats { splats: Box::new(splats), color_space, notices });
     }
+    let (mut document, worlds) = headers.into_document(memory_limit)?;
     // The caller frees the file after reading, so the document's memory does not include it.
-    let model = size::check(&document, loaded_bytes, memory_limit)?;
-    document.bytes = loaded_bytes - bytes.len() as u64 + model;
+    document.bytes = document.bytes - bytes.len() as u64 + document.permit.model_bytes();
     document.joints = skin::shown_joints(&document, &worlds)?;
     let n_before = notices.len();
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
@@ -416,48 +440,68 @@ pub(crate) fn read(
     }
     document.slots = geometry.slots;
     let counts = scene::counts(&document);
-    Ok(GltfModel {
+    Ok(GltfContent::Model(Box::new(GltfModel {
         origin: near,
         positions: geometry.positions,
         triangles: geometry.triangles,
         document,
         counts,
         notices,
-        splats: None,
-    })
+    })))
 }
 
 /// Reads a GLB that this crate has written. `origin`: point to which the positions are relative.
 pub(crate) fn read_written(name: &str, glb: &[u8], origin: DVec3) -> Result<GltfModel, GltfError> {
-    read(name, glb, &mut |_| None, u64::MAX, Some(origin), false)
+    match read(name, glb, &mut |_| None, u64::MAX, Some(origin), false)? {
+        GltfContent::Model(model) => Ok(*model),
+        GltfContent::Splats { .. } => Err(GltfError::NoTriangles),
+    }
 }
 
-/// Parses a file without reading its geometry. [`GltfDocument::bytes`] counts only the file and its buffers.
-fn parse(
-    name: &str,
-    bytes: &[u8],
-    resolve: &mut Resolve<'_>,
-    memory_limit: u64,
-    notices: &mut Vec<String>,
-) -> Result<(GltfDocument, Worlds), GltfError> {
-    let loaded = container::load(name, bytes, resolve, memory_limit, notices)?;
-    let worlds = Worlds::new(&loaded.root)?;
-    let [instances, elsewhere] = scene::instances(&loaded.root, &worlds, notices)?;
-    let document = GltfDocument {
-        json: loaded.json,
-        root: loaded.root,
-        buffers: loaded.buffers,
-        images: loaded.images,
-        text: loaded.text,
-        packed: loaded.packed,
-        is_decoded: loaded.is_decoded,
-        instances,
-        elsewhere,
-        joints: Vec::new(),
-        bytes: loaded.bytes,
-        slots: Vec::new(),
-    };
-    Ok((document, worlds))
+/// Reads the document of a GLB that this crate has written, without its geometry.
+pub(crate) fn document_written(name: &str, glb: &[u8]) -> Result<GltfDocument, GltfError> {
+    let headers = Headers::read(name, glb, &mut |_| None, u64::MAX, &mut Vec::new())?;
+    Ok(headers.into_document(u64::MAX)?.0)
+}
+
+impl Headers {
+    /// Loads a file without reading its geometry.
+    fn read(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+        notices: &mut Vec<String>,
+    ) -> Result<Self, GltfError> {
+        let loaded = container::load(name, bytes, resolve, memory_limit, notices)?;
+        let worlds = Worlds::new(&loaded.root)?;
+        let [instances, elsewhere] = scene::instances(&loaded.root, &worlds, notices)?;
+        Ok(Self { loaded, worlds, instances, elsewhere })
+    }
+
+    /// Prices the document. [`GltfDocument::bytes`] then counts only the file and its buffers.
+    fn into_document(self, memory_limit: u64) -> Result<(GltfDocument, Worlds), GltfError> {
+        let permit = size::permit(&self, memory_limit)?;
+        let Self { loaded, worlds, instances, elsewhere } = self;
+        let GltfContents { json, text, packed, is_decoded, root, buffers, images, bytes } = loaded;
+        let (joints, slots) = (Vec::new(), Vec::new());
+        let document = GltfDocument {
+            json,
+            root,
+            buffers,
+            images,
+            text,
+            packed,
+            is_decoded,
+            instances,
+            elsewhere,
+            joints,
+            bytes,
+            slots,
+            permit,
+        };
+        Ok((document, worlds))
+    }
 }
 
 /// Joints that influence vertices in a file; none if the file cannot be read.
@@ -467,12 +511,9 @@ pub(crate) fn joints_with_vertices_in(
     resolve: &mut Resolve<'_>,
     memory_limit: u64,
 ) -> Skeleton {
-    match parse(name, bytes, resolve, memory_limit, &mut Vec::new()) {
-        Ok((document, _)) if size::check(&document, document.bytes, memory_limit).is_ok() => {
-            joints_with_vertices(&document)
-        }
-        _ => Skeleton::default(),
-    }
+    let headers = Headers::read(name, bytes, resolve, memory_limit, &mut Vec::new());
+    let document = headers.and_then(|headers| headers.into_document(memory_limit));
+    document.map_or_else(|_| Skeleton::default(), |(document, _)| joints_with_vertices(&document))
 }
 
 /// Returns `list[index]`, or an error that names the object that contains the index.

@@ -5,17 +5,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ::gltf::json::Index;
 use ::gltf::json::accessor::Accessor;
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
+use ::gltf::json::{Index, Root};
 
-use super::accessor::{MAX_DECODED_VALUES, MAX_ELEMENTS};
+use super::accessor::{MAX_DECODED_VALUES, MAX_ELEMENTS, Source, count, count_absent};
 use super::container::bytes_of_json;
 use super::geometry::surface;
 use super::scene::Instance;
-use super::{GltfDocument, GltfError};
-use crate::memory::MemoryError;
+use super::{GltfError, Headers};
+use crate::order::{Budget, Expansion, Order, Permit, Price};
 
 /// Limit on the triangles of all instances.
 pub(crate) const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
@@ -99,51 +99,114 @@ impl Size {
     }
 }
 
-/// Checks that reading, playing and reshaping the document need at most `limit` bytes, including `held` bytes
-/// already in use, and that attribute counts match. Returns the bytes of the model.
+/// Counts of a document, of which its memory and the time to read, play and reshape it depend.
+#[derive(Clone, Debug, Default)]
+pub(super) struct DocumentSize {
+    /// The default scene, and all other meshes.
+    model: Size,
+    unseen: Size,
+    /// Values of the accessors of all clips. An accessor that several clips use counts once.
+    keys: u64,
+    joints: u64,
+    clips: u64,
+    channels: u64,
+    channel_values: u64,
+    /// Memory of the text that an export repeats for each node, bytes.
+    copied: u64,
+    /// Memory of the loaded file, bytes.
+    loaded: u64,
+}
+
+impl DocumentSize {
+    /// Memory of the model, bytes.
+    pub(super) fn model_bytes(&self) -> u64 {
+        let Size { vertices, triangles, primitives, .. } = self.model;
+        VERTEX_BYTES * vertices + TRIANGLE_BYTES * triangles + PRIMITIVE_BYTES * primitives
+    }
+
+    /// Counts what the document declares, and checks that attribute counts match.
+    ///
+    /// # Errors
+    /// [`GltfError::Count`], [`GltfError::Accessor`].
+    fn of(headers: &Headers) -> Result<Self, GltfError> {
+        let (mut model, mut unseen) = (Size::default(), Size::default());
+        for shown in by_mesh(&headers.instances) {
+            model.add(shown.len() as u64, of_mesh(&headers.loaded.root, shown[0].mesh)?);
+        }
+        for hidden in by_mesh(&headers.elsewhere) {
+            // Meshes outside the scene that cannot be read have size zero.
+            unseen
+                .add(hidden.len() as u64, of_mesh(&headers.loaded.root, hidden[0].mesh).unwrap_or_default());
+        }
+        let clips = headers.loaded.json["animations"].as_array().map_or(&[][..], Vec::as_slice);
+        let channels: usize = clips.iter().map(|clip| clip["channels"].as_array().map_or(0, Vec::len)).sum();
+        Ok(Self {
+            model,
+            unseen,
+            keys: keys_of(headers),
+            joints: headers.loaded.root.skins.iter().map(|skin| skin.joints.len() as u64).sum(),
+            clips: clips.len() as u64,
+            channels: channels as u64,
+            channel_values: channel_values(headers),
+            copied: copied_bytes(headers),
+            loaded: headers.loaded.bytes,
+        })
+    }
+}
+
+impl Order for DocumentSize {
+    fn price(&self) -> Price {
+        let Self { model, unseen, loaded, .. } = *self;
+        let decoded = model.decoded.saturating_add(unseen.decoded).saturating_add(self.keys);
+        let zeros = model.zeros.saturating_add(unseen.zeros);
+        let counts = vec![
+            ("vertices", model.vertices, MAX_ELEMENTS),
+            ("triangles", model.triangles, MAX_TRIANGLES),
+            ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
+            ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
+            ("joints of all skins", self.joints, MAX_JOINTS),
+            ("clips", self.clips, MAX_CLIPS),
+            ("channels of all clips", self.channels, MAX_CHANNELS),
+            ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
+            ("values of all channels of clips", self.channel_values, MAX_CHANNEL_VALUES.max(loaded)),
+            (
+                "elements without data in the file, of all nodes",
+                zeros,
+                MAX_ZEROS.max(loaded.saturating_mul(ZEROS_PER_BYTE)),
+            ),
+        ];
+        let bytes = [
+            (VERTEX_BYTES + VERTEX_READ_BYTES, model.vertices),
+            (TRIANGLE_BYTES + TRIANGLE_READ_BYTES, model.triangles),
+            (PRIMITIVE_BYTES, model.primitives),
+            (JOINT_BYTES, self.joints),
+            (KEY_BYTES, self.keys),
+            (1, self.copied),
+        ];
+        let bytes = bytes.into_iter().map(|(each, n)| n.saturating_mul(each)).fold(0, u64::saturating_add);
+        Price { counts, bytes, unpacked: 0 }
+    }
+}
+
+/// Memory of skins and morph targets, bytes.
+struct RigBytes(u64);
+
+impl Order for RigBytes {
+    fn price(&self) -> Price {
+        Price { bytes: self.0, ..Price::default() }
+    }
+}
+
+/// Prices reading, playing and reshaping a document. `limit`: bytes, including those of the loaded file.
 ///
 /// # Errors
 /// [`GltfError::Memory`], [`GltfError::TooLarge`], [`GltfError::Count`], [`GltfError::Accessor`].
-pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u64, GltfError> {
-    let (mut model, mut unseen) = (Size::default(), Size::default());
-    for shown in by_mesh(&document.instances) {
-        model.add(shown.len() as u64, of_mesh(document, shown[0].mesh)?);
-    }
-    for hidden in by_mesh(&document.elsewhere) {
-        // Meshes outside the scene that cannot be read have size zero.
-        unseen.add(hidden.len() as u64, of_mesh(document, hidden[0].mesh).unwrap_or_default());
-    }
-    let keys = keys_of(document);
-    let decoded = model.decoded.saturating_add(unseen.decoded).saturating_add(keys);
-    let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
-    let clips = document.json["animations"].as_array().map_or(&[][..], Vec::as_slice);
-    let channels: usize = clips.iter().map(|clip| clip["channels"].as_array().map_or(0, Vec::len)).sum();
-    for (what, count, limit) in [
-        ("vertices", model.vertices, MAX_ELEMENTS),
-        ("triangles", model.triangles, MAX_TRIANGLES),
-        ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
-        ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
-        ("joints of all skins", joints, MAX_JOINTS),
-        ("clips", clips.len() as u64, MAX_CLIPS),
-        ("channels of all clips", channels as u64, MAX_CHANNELS),
-        ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
-        ("values of all channels of clips", channel_values(document), MAX_CHANNEL_VALUES.max(held)),
-        (
-            "elements without data in the file, of all nodes",
-            model.zeros.saturating_add(unseen.zeros),
-            MAX_ZEROS.max(held.saturating_mul(ZEROS_PER_BYTE)),
-        ),
-    ] {
-        if count > limit {
-            return Err(GltfError::TooLarge { what, count, limit });
-        }
-    }
-    let bytes =
-        VERTEX_BYTES * model.vertices + TRIANGLE_BYTES * model.triangles + PRIMITIVE_BYTES * model.primitives;
-    let reading = VERTEX_READ_BYTES * model.vertices + TRIANGLE_READ_BYTES * model.triangles;
-    let rig = rig_bytes(document) + JOINT_BYTES * joints + KEY_BYTES * keys;
-    MemoryError::check((held + bytes + reading + rig).saturating_add(copied_bytes(document)), limit)?;
-    Ok(bytes)
+pub(super) fn permit(headers: &Headers, limit: u64) -> Result<Permit<DocumentSize>, GltfError> {
+    let mut budget = Budget::new(headers.loaded.bytes, headers.loaded.bytes, limit, Expansion::GEOMETRY);
+    let permit = budget.permit(DocumentSize::of(headers)?)?;
+    let source = Source::new(&headers.loaded.root, &headers.loaded.buffers, &permit);
+    budget.permit(RigBytes(rig_bytes(headers, source)))?;
+    Ok(permit)
 }
 
 fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
@@ -152,15 +215,16 @@ fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
 
 /// Estimates the memory of the text that an export repeats for each node, bytes: the JSON of its mesh, and names for
 /// each primitive.
-fn copied_bytes(document: &GltfDocument) -> u64 {
-    let length =
-        |list: &str, n: usize| document.json[list][n]["name"].as_str().map_or(0, |name| name.len() as u64);
+fn copied_bytes(document: &Headers) -> u64 {
+    let length = |list: &str, n: usize| {
+        document.loaded.json[list][n]["name"].as_str().map_or(0, |name| name.len() as u64)
+    };
     let mut sum = 0_u64;
     for shown in by_mesh(&document.instances) {
         let mesh = shown[0].mesh as usize;
-        let (primitives, n) = (&document.root.meshes[mesh].primitives, shown.len() as u64);
+        let (primitives, n) = (&document.loaded.root.meshes[mesh].primitives, shown.len() as u64);
         let n_primitives = primitives.len() as u64;
-        let json = bytes_of_json(document.json["meshes"][mesh].to_string().as_bytes());
+        let json = bytes_of_json(document.loaded.json["meshes"][mesh].to_string().as_bytes());
         let materials = primitives.iter().filter_map(|p| p.material).map(|m| length("materials", m.value()));
         let of_mesh = (n - 1).saturating_mul(json.saturating_sub(PRIMITIVE_JSON_BYTES * n_primitives));
         let names = n.saturating_mul(materials.sum::<u64>() + n_primitives * length("meshes", mesh));
@@ -173,19 +237,18 @@ fn copied_bytes(document: &GltfDocument) -> u64 {
 }
 
 /// Estimates the memory of skins and morph targets, bytes. An accessor that cannot be read counts by its declared size.
-fn rig_bytes(document: &GltfDocument) -> u64 {
+fn rig_bytes(document: &Headers, source: Source<'_>) -> u64 {
     let mut moved: BTreeMap<u32, u64> = BTreeMap::new();
-    let mut moved_by = |accessor: u32| {
-        *moved.entry(accessor).or_insert_with(|| document.source().count_nonzero(accessor).unwrap_or(0))
-    };
+    let mut moved_by =
+        |accessor: u32| *moved.entry(accessor).or_insert_with(|| source.count_nonzero(accessor).unwrap_or(0));
     let mut bytes = 0;
     for shown in [&document.instances, &document.elsewhere].into_iter().flat_map(|all| by_mesh(all)) {
         let n_skinned = shown.iter().filter(|instance| instance.skin.is_some()).count() as u64;
-        for primitive in &document.root.meshes[shown[0].mesh as usize].primitives {
+        for primitive in &document.loaded.root.meshes[shown[0].mesh as usize].primitives {
             let Some(position) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
                 continue;
             };
-            let vertices = document.source().count(position.value() as u32).unwrap_or(0);
+            let vertices = source.count(position.value() as u32).unwrap_or(0);
             let targets = || primitive.targets.iter().flatten();
             let moved: u64 = targets().filter_map(|t| t.positions).map(|a| moved_by(a.value() as u32)).sum();
             let rigged = if targets().next().is_some() { shown.len() as u64 } else { n_skinned };
@@ -197,8 +260,8 @@ fn rig_bytes(document: &GltfDocument) -> u64 {
 }
 
 /// Counts the values in the accessors of all clips. An accessor that several clips use counts once.
-fn keys_of(document: &GltfDocument) -> u64 {
-    let animations = document.json["animations"].as_array().into_iter().flatten();
+fn keys_of(document: &Headers) -> u64 {
+    let animations = document.loaded.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| animation["samplers"].as_array().into_iter().flatten());
     let accessors: BTreeSet<u64> =
         samplers.flat_map(|s| ["input", "output"].map(|key| s[key].as_u64())).flatten().collect();
@@ -207,8 +270,8 @@ fn keys_of(document: &GltfDocument) -> u64 {
 
 /// Counts the values of all channels of clips. An export adapts each channel on its own, so a shared sampler counts
 /// once per channel.
-fn channel_values(document: &GltfDocument) -> u64 {
-    let animations = document.json["animations"].as_array().into_iter().flatten();
+fn channel_values(document: &Headers) -> u64 {
+    let animations = document.loaded.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| {
         let channels = animation["channels"].as_array().into_iter().flatten();
         channels.filter_map(move |channel| animation["samplers"].get(channel["sampler"].as_u64()? as usize))
@@ -217,28 +280,28 @@ fn channel_values(document: &GltfDocument) -> u64 {
     accessors.filter_map(|accessor| numbers_in(document, accessor)).fold(0, u64::saturating_add)
 }
 
-fn numbers_in(document: &GltfDocument, accessor: u64) -> Option<u64> {
-    let width = match &document.root.accessors.get(accessor as usize)?.type_ {
+fn numbers_in(document: &Headers, accessor: u64) -> Option<u64> {
+    let width = match &document.loaded.root.accessors.get(accessor as usize)?.type_ {
         Checked::Valid(kind) => kind.multiplicity() as u64,
         Checked::Invalid => return None,
     };
-    Some(document.source().count(accessor as u32).ok()?.saturating_mul(width))
+    Some(count(&document.loaded.root, accessor as u32).ok()?.saturating_mul(width))
 }
 
-fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
+fn of_mesh(root: &Root, mesh: u32) -> Result<Size, GltfError> {
     let mut size = Size::default();
-    for primitive in &document.root.meshes[mesh as usize].primitives {
+    for primitive in &root.meshes[mesh as usize].primitives {
         size.primitives += 1;
         let n_targets = primitive.targets.as_ref().map_or(0, Vec::len) as u64;
         size.targets = size.targets.max(n_targets);
         let Some((position, mode)) = surface(primitive) else { continue };
-        let vertices = document.source().count(position)?;
-        let (attributes, mut zeros) = check_counts(document, primitive, vertices)?;
+        let vertices = count(root, position)?;
+        let (attributes, mut zeros) = check_counts(root, primitive, vertices)?;
         let corners = match primitive.indices {
             None => vertices,
             Some(indices) => {
-                let corners = document.source().count(indices.value() as u32)?;
-                zeros += document.source().count_absent(indices.value() as u32);
+                let corners = count(root, indices.value() as u32)?;
+                zeros += count_absent(root, indices.value() as u32);
                 corners
             }
         };
@@ -254,16 +317,12 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
 
 /// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes, and the
 /// number of implicit zeros.
-fn check_counts(
-    document: &GltfDocument,
-    primitive: &Primitive,
-    vertices: u64,
-) -> Result<(u64, u64), GltfError> {
+fn check_counts(root: &Root, primitive: &Primitive, vertices: u64) -> Result<(u64, u64), GltfError> {
     let check = |what: &dyn Fn() -> String, index: &Index<Accessor>| {
         let accessor = index.value() as u32;
-        let count = document.source().count(accessor)?;
+        let count = count(root, accessor)?;
         if count == vertices {
-            return Ok(document.source().count_absent(accessor));
+            return Ok(count_absent(root, accessor));
         }
         Err(GltfError::Count { accessor, what: what(), count, expected: vertices, of: "vertices" })
     };

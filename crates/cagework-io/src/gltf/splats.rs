@@ -6,12 +6,13 @@ use cagework_core::splats::{decompose, n_harmonics, rotate_harmonics, turn_of};
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 use serde_json::{Value, json};
 
-use super::accessor::Source;
+use super::accessor::{Source, count};
 use super::container::glb_of;
 use super::size::MAX_PRIMITIVES;
-use super::{GltfDocument, GltfError, SPLATS_EXTENSION};
+use super::{GltfError, Headers, SPLATS_EXTENSION};
 use crate::error::WriteError;
-use crate::splats::{RawSplats, SplatError, SplatsToWrite, band_0, color_of, unit_byte};
+use crate::order::{Budget, Expansion};
+use crate::splats::{RawSplats, SplatError, SplatOrder, SplatsToWrite, band_0, color_of, unit_byte};
 
 /// Colour space of 3DGS captures.
 const SRGB: &str = "srgb_rec709_display";
@@ -37,15 +38,11 @@ fn harmonic(degree: u8, coefficient: usize) -> String {
 }
 
 /// Reads the splats of the scene, and their colour space. `None` if it has triangles or no splats.
-pub(crate) fn read(
-    document: &GltfDocument,
-    held: u64,
-    memory_limit: u64,
-) -> Result<Option<(RawSplats, String)>, GltfError> {
+pub(crate) fn read(headers: &Headers, memory_limit: u64) -> Result<Option<(RawSplats, String)>, GltfError> {
     let mut spaces = Vec::new();
-    let source = document.source();
+    let (document, held) = (&headers.loaded, headers.loaded.bytes);
     let mut parts = Vec::new();
-    for instance in &document.instances {
+    for instance in &headers.instances {
         for (p, primitive) in document.root.meshes[instance.mesh as usize].primitives.iter().enumerate() {
             if super::geometry::surface(primitive).is_some() {
                 return Ok(None);
@@ -68,7 +65,7 @@ pub(crate) fn read(
                 (0..2 * usize::from(degree) + 1).all(|k| attributes.get(harmonic(degree, k)).is_some())
             };
             let degree = (1..=3).take_while(|&degree| has(degree)).last().unwrap_or(0);
-            let count = source.count(accessor(attributes, "POSITION")?)?;
+            let count = count(&document.root, accessor(attributes, "POSITION")?)?;
             parts.push(SplatPrimitive { world: instance.world, count, attributes, degree });
         }
     }
@@ -77,19 +74,21 @@ pub(crate) fn read(
     // The size of the file does not limit this count: several nodes can show the same splats, and accessors need no
     // data.
     let most = MAX_SPLATS.max(held.saturating_mul(SPLATS_PER_BYTE));
-    for (what, count, limit) in [
-        ("primitives of all nodes", parts.len() as u64, MAX_PRIMITIVES),
-        ("splats of all nodes", count, most),
-    ] {
-        if count > limit {
-            return Err(GltfError::TooLarge { what, count, limit });
-        }
-    }
     if spaces.iter().any(|space| *space != spaces[0]) {
         let problem = "its splats have different colour spaces: export them as .ply or .spz instead";
         return Err(SplatError::Unsupported(problem.into()).into());
     }
-    let mut raw = RawSplats::new(count, degree, held, memory_limit)?;
+    if count == 0 {
+        return Err(SplatError::Empty.into());
+    }
+    let counts = vec![
+        ("primitives of all nodes", parts.len() as u64, MAX_PRIMITIVES),
+        ("splats of all nodes", count, most),
+    ];
+    let mut budget = Budget::new(held, held, memory_limit, Expansion::GEOMETRY);
+    let permit = budget.permit(SplatOrder { counts, count, degree, unpacked: 0, window: 0 })?;
+    let source = Source::new(&document.root, &document.buffers, &permit);
+    let mut raw = RawSplats::new(&permit);
     for part in &parts {
         part.read(source, &mut raw)?;
     }

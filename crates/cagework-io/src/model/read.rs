@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::{Document, Model, ModelFormat, ReadError};
 use crate::counts::Counts;
+use crate::gltf::GltfContent;
 use crate::origin::origin_near;
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::siblings::Resolve;
@@ -47,17 +48,20 @@ impl Source<'_, '_> {
     pub(super) fn gltf(self) -> Result<Model, ReadError> {
         let origin = (!self.near).then_some(DVec3::ZERO);
         let (limit, clips_alone) = (self.memory_limit, self.clips_alone);
-        let mut model = gltf::read(self.name, &self.bytes, self.resolve, limit, origin, clips_alone)
+        let content = gltf::read(self.name, &self.bytes, self.resolve, limit, origin, clips_alone)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
-        if let Some((raw, color_space)) = model.splats.take() {
-            if color_space == gltf::LINEAR_SPLATS {
-                model.notices.push("the colours of the splats are linear: drawn too dark".to_owned());
+        let model = match content {
+            GltfContent::Model(model) => model,
+            GltfContent::Splats { splats, color_space, mut notices } => {
+                if color_space == gltf::LINEAR_SPLATS {
+                    notices.push("the colours of the splats are linear: drawn too dark".to_owned());
+                }
+                let records = Records::Gltf(color_space);
+                let mut read = splats.finish(self.near, records).map_err(|e| self.splat_fault(e))?;
+                read.notices.append(&mut notices);
+                return Ok(self.capture(ModelFormat::Gltf, read));
             }
-            let mut read =
-                raw.finish(self.near, Records::Gltf(color_space)).map_err(|e| self.splat_fault(e))?;
-            read.notices.append(&mut model.notices);
-            return Ok(self.capture(ModelFormat::Gltf, read));
-        }
+        };
         Ok(Model {
             name: self.name.into(),
             positions: model.positions,

@@ -12,7 +12,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::NpzError;
-use crate::memory::{Expansion, MemoryError};
+use crate::order::{Budget, Expansion, Refusal, Stream};
 use crate::shown::shown;
 
 /// Limit on the size of an array's header, bytes. NumPy writes 100 to 200.
@@ -113,35 +113,13 @@ pub(super) struct Archive<'a> {
     budget: Budget,
 }
 
-/// Bytes of the arrays of a file, counted before they are unpacked.
-pub(super) struct Budget {
-    /// Size of the file, bytes.
-    file: u64,
-    /// Total bytes of the arrays read so far.
-    unpacked: u64,
-    memory_limit: u64,
-}
-
-impl Budget {
-    pub(super) fn new(file: u64, memory_limit: u64) -> Self {
-        Self { file, unpacked: 0, memory_limit }
-    }
-
-    /// Counts an array. Raw and converted values are in memory at the same time.
-    fn take(&mut self, array: &'static str, bytes: u64) -> Result<(), NpzError> {
-        self.unpacked = self.unpacked.saturating_add(bytes);
-        MemoryError::check(self.unpacked.saturating_mul(2), self.memory_limit)?;
-        Expansion::TEXT.check(self.unpacked, self.file).map_err(|problem| NpzError::Array { array, problem })
-    }
-}
-
 impl<'a> Archive<'a> {
     /// Opens an archive. `memory_limit`: limit on the memory of the arrays that are read from it, bytes.
     ///
     /// # Errors
     /// [`NpzError::Zip`] if the bytes are not a zip archive.
     pub(super) fn new(bytes: &'a [u8], memory_limit: u64) -> Result<Self, NpzError> {
-        let budget = Budget::new(bytes.len() as u64, memory_limit);
+        let budget = Budget::new(bytes.len() as u64, 0, memory_limit, Expansion::TEXT);
         Ok(Self { zip: ZipArchive::new(Cursor::new(bytes))?, budget })
     }
 
@@ -207,8 +185,8 @@ fn lengths(text: &str) -> Option<Vec<usize>> {
 }
 
 impl NpyArray {
-    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `budget`
-    /// counts its bytes first.
+    /// Reads the header of an array, and unpacks the array with a permit from `budget`. The size follows from the shape,
+    /// because the sizes in an archive's directory are not trusted.
     pub(super) fn read(
         name: &'static str,
         from: &mut impl std::io::Read,
@@ -216,14 +194,11 @@ impl NpyArray {
     ) -> Result<Self, NpzError> {
         let fault = |problem: String| NpzError::Array { array: name, problem };
         let bad = || fault("is not in NumPy's .npy format".into());
-        let mut unpack = |most: u64, into: &mut Vec<u8>| {
-            let unpacked = from.by_ref().take(most).read_to_end(into);
-            unpacked.map_err(|_| fault("cannot be unpacked: the file is damaged".into()))
-        };
+        let damaged = |_| fault("cannot be unpacked: the file is damaged".into());
         let mut bytes = Vec::new();
-        unpack(PREAMBLE_BYTES, &mut bytes)?;
+        from.by_ref().take(PREAMBLE_BYTES).read_to_end(&mut bytes).map_err(damaged)?;
         let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER_BYTES).ok_or_else(bad)?;
-        unpack(end.saturating_sub(PREAMBLE_BYTES), &mut bytes)?;
+        from.by_ref().take(end.saturating_sub(PREAMBLE_BYTES)).read_to_end(&mut bytes).map_err(damaged)?;
         let text = bytes.get(HEADER_TEXT_OFFSET..end as usize).ok_or_else(bad)?;
         let text = std::str::from_utf8(text).map_err(|_| bad())?;
         let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
@@ -238,10 +213,13 @@ impl NpyArray {
         let needed = needed.ok_or_else(|| {
             fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}"))))
         })?;
-        budget.take(name, needed)?;
-        let mut data = Vec::new();
-        // Reading one byte more than needed detects streams that are too long.
-        unpack(needed.saturating_add(1), &mut data)?;
+        // Raw and converted values are in memory at the same time.
+        let permit =
+            budget.permit(Stream { unpacked: needed, copies: 2 }).map_err(|refusal| match refusal {
+                Refusal::Memory(error) => error.into(),
+                other => fault(other.to_string()),
+            })?;
+        let data = permit.unpack(from).map_err(damaged)?;
         if data.len() as u64 > needed {
             return Err(fault(format!("is longer than the {needed} bytes of its shape {shape:?}")));
         }

@@ -6,9 +6,11 @@ use std::ops::Range;
 use glam::{DVec3, Quat, Vec3};
 
 use super::{
-    RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, band_0, color_of, log_odds, log_scale, sigmoid,
+    RawSplats, ReadSplats, Records, SplatError, SplatOrder, SplatsToWrite, band_0, color_of, log_odds,
+    log_scale, sigmoid,
 };
 use crate::memory::MemoryError;
+use crate::order::{Budget, Expansion};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Limit on the size of a header, bytes.
@@ -414,7 +416,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     let harmonics = table.harmonics()?;
     let degree = [0, 3, 8, 15].iter().position(|&n| n == harmonics.len()).unwrap_or_default() as u8;
     let held = 2 * bytes.len() as u64 + table.bytes.len() as u64;
-    let mut raw = RawSplats::new(table.count as u64, degree, held, memory_limit)?;
+    let order = SplatOrder { count: table.count as u64, degree, ..SplatOrder::default() };
+    let mut budget = Budget::new(bytes.len() as u64, held, memory_limit, Expansion::SPLATS);
+    let mut raw = RawSplats::new(&order.permit(&mut budget)?);
     for vertex in 0..table.count {
         let number = |column: usize| table.get(vertex, column) as f32;
         let vector = |columns: [usize; 3]| Vec3::from_array(columns.map(number));

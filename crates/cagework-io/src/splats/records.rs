@@ -3,7 +3,8 @@
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::{RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, unit_byte};
+use super::{RawSplats, ReadSplats, Records, SplatError, SplatOrder, SplatsToWrite, unit_byte};
+use crate::order::{Budget, Expansion};
 
 /// Size of a splat, bytes.
 const RECORD: usize = 32;
@@ -16,7 +17,10 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
             bytes.len()
         )));
     }
-    let mut raw = RawSplats::new((bytes.len() / RECORD) as u64, 0, 2 * bytes.len() as u64, memory_limit)?;
+    let (count, size) = ((bytes.len() / RECORD) as u64, bytes.len() as u64);
+    let mut budget = Budget::new(size, 2 * size, memory_limit, Expansion::SPLATS);
+    let permit = SplatOrder { count, ..SplatOrder::default() }.permit(&mut budget)?;
+    let mut raw = RawSplats::new(&permit);
     for record in bytes.chunks_exact(RECORD) {
         let float = |k: usize| f32::from_le_bytes([record[k], record[k + 1], record[k + 2], record[k + 3]]);
         let vector = |k: usize| Vec3::new(float(k), float(k + 4), float(k + 8));

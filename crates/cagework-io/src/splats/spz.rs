@@ -11,10 +11,11 @@ use glam::{DVec3, Quat, Vec3};
 use ruzstd::decoding::FrameDecoder;
 
 use super::{
-    RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, band_0, color_of, log_scale, unit_byte,
+    RawSplats, ReadSplats, Records, SplatError, SplatOrder, SplatsToWrite, band_0, color_of, log_scale,
+    unit_byte,
 };
 use crate::error::WriteError;
-use crate::memory::{Expansion, MemoryError};
+use crate::order::{Budget, Expansion, Permit};
 
 const MAGIC: [u8; 4] = *b"NGSP";
 const HEADER: usize = 16;
@@ -133,16 +134,15 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
         return Err(SplatError::Count { count, needed, found: size });
     }
     let needed = count * each;
-    Expansion::SPLATS.check(needed, size).map_err(SplatError::Damaged)?;
     let window = if is_zstd { ZSTD_WINDOW.max(needed) } else { 0 };
-    let held = needed + 2 * size + window;
-    MemoryError::check(held, memory_limit)?;
-    let mut raw = RawSplats::new(count, layout.degree, held, memory_limit)?;
+    let order = SplatOrder { count, degree: layout.degree, unpacked: needed, window, counts: Vec::new() };
+    let permit = order.permit(&mut Budget::new(size, 2 * size, memory_limit, Expansion::SPLATS))?;
+    let mut raw = RawSplats::new(&permit);
     let mut body = Vec::with_capacity(HEADER + needed as usize);
     body.extend(header);
     let mut extensions = Vec::new();
     if is_zstd {
-        extensions.extend(read_streams(bytes, layout, window, &mut body)?);
+        extensions.extend(read_streams(bytes, layout, &permit, &mut body)?);
         body[4..8].copy_from_slice(&VERSION.to_le_bytes());
         body[HEADER - 1] = 0;
     } else {
@@ -189,12 +189,11 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     Ok(read)
 }
 
-/// Appends the arrays of a file of version 4 to `body`, and returns the file's extension records. `window`: limit on the
-/// memory of the decoder, bytes.
+/// Appends the arrays of a file of version 4 to `body`, and returns the file's extension records.
 fn read_streams<'a>(
     bytes: &'a [u8],
     layout: Layout,
-    window: u64,
+    permit: &Permit<SplatOrder>,
     body: &mut Vec<u8>,
 ) -> Result<&'a [u8], SplatError> {
     let damaged = |what: String| Err(SplatError::Damaged(what));
@@ -206,7 +205,7 @@ fn read_streams<'a>(
     let arrays = layout.sizes().into_iter().map(|size| (size * layout.count) as u64);
     let mut arrays = arrays.filter(|&size| size > 0);
     let mut decoder = FrameDecoder::new();
-    decoder.set_max_window_size(window);
+    decoder.set_max_window_size(permit.window);
     for (k, row) in table.as_chunks::<8>().0.chunks_exact(2).enumerate() {
         let [compressed, size] = [row[0], row[1]].map(u64::from_le_bytes);
         let split = usize::try_from(compressed).ok().and_then(|size| rest.split_at_checked(size));

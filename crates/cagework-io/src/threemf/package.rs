@@ -1,7 +1,7 @@
 //! The zip archive of a 3MF.
 
 use std::collections::HashMap;
-use std::io::{Read, Write as _};
+use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::read::DeflateDecoder;
@@ -13,7 +13,7 @@ use rawzip::{CompressionMethod, DataDescriptorOutput, Error, ZipArchive, ZipArch
 
 use super::xml::attributes;
 use crate::error::WriteError;
-use crate::memory::{Expansion, MemoryError};
+use crate::order::{Budget, Expansion, Stream};
 use crate::polygons::PolygonsError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
@@ -63,12 +63,9 @@ pub(super) struct Package<'a> {
     entries: Vec<Entry<'a>>,
     /// Index of each entry by [`part_name`].
     index_of: HashMap<Vec<u8>, usize>,
-    /// Size of the archive, bytes.
-    size: u64,
     comment: Vec<u8>,
-    /// Bytes of the texts unpacked so far.
-    pub(super) unpacked: u64,
-    memory_limit: u64,
+    /// Memory of the archive and of the texts unpacked so far.
+    pub(super) budget: Budget,
 }
 
 /// Normalises a name for comparisons. Names of parts ignore case and may begin with a slash.
@@ -128,7 +125,13 @@ impl<'a> Package<'a> {
             ));
         }
         let index_of = (0..entries.len()).rev().map(|k| (part_name(&entries[k].name), k)).collect();
-        Ok(Self { entries, index_of, size: bytes.len() as u64, comment, unpacked: 0, memory_limit })
+        let size = bytes.len() as u64;
+        Ok(Self {
+            entries,
+            index_of,
+            comment,
+            budget: Budget::new(size, size, memory_limit, Expansion::TEXT),
+        })
     }
 
     /// Index of an entry.
@@ -178,27 +181,23 @@ impl<'a> Package<'a> {
         }
     }
 
-    /// Unpacks an entry. The size that the archive's directory declares is checked against the limits first. Unpacking
-    /// stops one byte after the declared size, and fails if the entry has another size.
+    /// Unpacks an entry, with a permit for the size that the archive's directory declares. Fails if the entry has another
+    /// size.
     pub(super) fn text(&mut self, name: &str, index: usize) -> Result<String, PolygonsError> {
         let entry = &self.entries[index];
-        let size = entry.size;
-        self.unpacked = self.unpacked.saturating_add(size);
-        // The factor 2 covers the text and its parsed content: a vertex or triangle takes less memory than its text,
-        // which has at least 27 or 34 characters.
-        MemoryError::check(self.unpacked.saturating_mul(2), self.memory_limit)?;
-        Expansion::TEXT.check(self.unpacked, self.size).map_err(PolygonsError::Syntax)?;
-        let mut bytes = Vec::with_capacity(size as usize + 1);
-        let mut unpack = |from: &mut dyn Read| from.take(size.saturating_add(1)).read_to_end(&mut bytes);
+        // Text and parsed content: a vertex or triangle takes less memory than its text, which has at least 27 or 34
+        // characters.
+        let permit = self.budget.permit(Stream { unpacked: entry.size, copies: 2 })?;
         let unpacked = match entry.method {
-            CompressionMethod::STORE if !entry.is_encrypted => unpack(&mut &*entry.data),
-            CompressionMethod::DEFLATE if !entry.is_encrypted => unpack(&mut DeflateDecoder::new(entry.data)),
+            CompressionMethod::STORE if !entry.is_encrypted => permit.unpack(entry.data),
+            CompressionMethod::DEFLATE if !entry.is_encrypted => {
+                permit.unpack(DeflateDecoder::new(entry.data))
+            }
             _ if entry.is_encrypted => return Err(encrypted(name)),
             _ => return Err(fault(name, "is compressed by a method other than deflate")),
         };
-        if unpacked.is_err() || bytes.len() as u64 != size || crc32(&bytes) != entry.crc {
-            return Err(fault(name, "cannot be unpacked"));
-        }
+        let fits = |bytes: &Vec<u8>| bytes.len() as u64 == entry.size && crc32(bytes) == entry.crc;
+        let bytes = unpacked.ok().filter(fits).ok_or_else(|| fault(name, "cannot be unpacked"))?;
         if bytes.starts_with(ENCRYPTED) {
             return Err(encrypted(name));
         }

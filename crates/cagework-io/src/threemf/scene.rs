@@ -7,17 +7,18 @@ use glam::DAffine3;
 use super::package::{Package, fault, part_name};
 use super::part::{MAX_OBJECTS, ModelPart, Object, PartCounts, Placement};
 use crate::gltf::{MAX_ELEMENTS, MAX_TRIANGLES};
+use crate::order::{Order, Permit, Price};
 use crate::polygons::{Polygons, PolygonsError};
 use crate::shown::shown;
 
 /// Limit on the nesting of components.
 const MAX_DEPTH: u32 = 64;
 
-/// Limit on the bytes of the names of all instances: 256 each for the largest number of instances. Names are copied for
-/// each instance, and commands list them.
+/// Limit on the bytes of the names of all instances: 256 each for the largest number of instances. Groups of faces copy
+/// the name of their instance, and commands list them.
 const MAX_NAME_BYTES: u64 = 256 * MAX_OBJECTS;
 
-/// Memory of an instance and of its group of faces, bytes, without the two copies of its name.
+/// Memory of an instance and of its group of faces, bytes, without the group's copy of the name.
 const INSTANCE_BYTES: u64 = 300;
 
 /// Index of a part, and of an object in it.
@@ -40,8 +41,8 @@ pub(super) struct Scene {
 /// A placement of an object that has vertices.
 pub(super) struct Instance {
     pub(super) object: Key,
-    /// Name of the object or of the nearest object that contains it and has a name.
-    pub(super) name: String,
+    /// The object itself or the nearest object that contains it, whichever has a name.
+    named: Option<Key>,
     /// Transform from the object's space to the space of the build.
     pub(super) transform: DAffine3,
     pub(super) first_vertex: u32,
@@ -58,6 +59,20 @@ struct Totals {
     names: u64,
     unnamed: u64,
     depth: u32,
+}
+
+impl Order for Totals {
+    fn price(&self) -> Price {
+        let counts = vec![
+            ("objects", self.instances, MAX_OBJECTS),
+            ("vertices", self.vertices, MAX_ELEMENTS),
+            ("triangles", self.triangles, MAX_TRIANGLES),
+            ("characters in the names of its objects", self.names, MAX_NAME_BYTES),
+        ];
+        let of_instances = INSTANCE_BYTES.saturating_mul(self.instances).saturating_add(self.names);
+        let of_mesh = Polygons::bytes_of(self.vertices, self.triangles.saturating_mul(3));
+        Price { counts, bytes: of_instances.saturating_add(of_mesh), ..Price::default() }
+    }
 }
 
 impl Totals {
@@ -81,7 +96,7 @@ enum Measurement {
 }
 
 impl Scene {
-    /// Reads all parts that the build needs, and checks counts and memory before the instances are created.
+    /// Reads all parts that the build needs, prices the instances, and creates them.
     pub(super) fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PolygonsError> {
         let mut package = Package::open(bytes, memory_limit)?;
         let first = package.first_part()?;
@@ -110,8 +125,9 @@ impl Scene {
             }
             next += 1;
         }
-        scene.bytes = package.unpacked.saturating_mul(2).saturating_add(bytes.len() as u64);
-        scene.place(memory_limit)?;
+        scene.bytes = package.budget.held();
+        let permit = package.budget.permit(scene.totals()?)?;
+        scene.place(&permit)?;
         Ok(scene)
     }
 
@@ -151,28 +167,24 @@ impl Scene {
         index.map(|&index| (of, index)).ok_or_else(|| fault(&self.parts[part].0, &problem()))
     }
 
-    /// Checks counts and memory, and creates the instances in order.
-    fn place(&mut self, memory_limit: u64) -> Result<(), PolygonsError> {
+    /// The name of an instance; empty if neither the object nor any that contains it has one.
+    pub(super) fn name(&self, instance: &Instance) -> &str {
+        instance.named.map_or("", |key| &self.object(key).name)
+    }
+
+    /// Counts what the build shows.
+    fn totals(&self) -> Result<Totals, PolygonsError> {
         let new = |(_, part): &(String, ModelPart)| vec![Measurement::New; part.objects.len()];
         let mut states: Vec<Vec<Measurement>> = self.parts.iter().map(new).collect();
         let mut all = Totals::default();
         for item in &self.parts[0].1.items {
             all.add(self.measure(self.target(0, item)?, 0, &mut states)?);
         }
-        for (count, what, limit) in [
-            (all.instances, "objects", MAX_OBJECTS),
-            (all.vertices, "vertices", MAX_ELEMENTS),
-            (all.triangles, "triangles", MAX_TRIANGLES),
-            (all.names, "characters in the names of its objects", MAX_NAME_BYTES),
-        ] {
-            if count > limit {
-                return Err(PolygonsError::TooMany { count, what, limit });
-            }
-        }
-        // Each instance and its group have a copy of the name.
-        let of_instances = INSTANCE_BYTES * all.instances + 2 * all.names;
-        let kept = self.bytes.saturating_add(of_instances);
-        Polygons::check_memory(kept, all.vertices, 3 * all.triangles, memory_limit)?;
+        Ok(all)
+    }
+
+    /// Creates the instances in order.
+    fn place(&mut self, all: &Permit<Totals>) -> Result<(), PolygonsError> {
         if all.triangles == 0 && self.parts[0].1.items.is_empty() {
             return Err(PolygonsError::NoItems);
         }
@@ -180,7 +192,7 @@ impl Scene {
         let mut instances = Vec::with_capacity(all.instances as usize);
         let mut n = 0;
         for item in &self.parts[0].1.items {
-            self.add_instances(self.target(0, item)?, item.transform, "", &mut n, &mut instances)?;
+            self.add_instances(self.target(0, item)?, item.transform, None, &mut n, &mut instances)?;
         }
         self.instances = instances;
         for (_, part) in &self.parts {
@@ -240,18 +252,18 @@ impl Scene {
         &self,
         key: Key,
         transform: DAffine3,
-        name: &str,
+        named: Option<Key>,
         n: &mut u32,
         to: &mut Vec<Instance>,
     ) -> Result<(), PolygonsError> {
         let object = self.object(key);
-        let name = if object.name.is_empty() { name } else { &object.name };
+        let named = if object.name.is_empty() { named } else { Some(key) };
         for component in &object.components {
             let target = self.target(key.0, component)?;
-            self.add_instances(target, transform * component.transform, name, n, to)?;
+            self.add_instances(target, transform * component.transform, named, n, to)?;
         }
         if !object.vertices.is_empty() {
-            to.push(Instance { object: key, name: name.to_owned(), transform, first_vertex: *n });
+            to.push(Instance { object: key, named, transform, first_vertex: *n });
             *n += object.vertices.len() as u32;
         }
         Ok(())
