@@ -4,14 +4,12 @@ mod outputs;
 mod whole;
 
 use std::fs;
-use std::io::{ErrorKind, Read as _, Write as _};
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use cagework_files::folder_of;
 use cagework_io::ModelFormat;
-use cap_fs_ext::OpenOptionsSyncExt as _;
-use cap_std::ambient_authority;
-use cap_std::fs::{Dir, File, OpenOptions};
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -21,9 +19,6 @@ use outputs::FileIdentity;
 pub(crate) use outputs::{check_outputs, refuse_files_named, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
-/// Largest size of a file that is read, bytes.
-const MAX_FILE_BYTES: u64 = cagework_io::MAX_MODEL_BYTES;
-
 /// All files read so far, including buffers, materials and textures that models name. Outputs must not overwrite them.
 static INPUT_FILES: Mutex<Vec<FileIdentity>> = Mutex::new(Vec::new());
 
@@ -32,8 +27,7 @@ static INPUT_FILES: Mutex<Vec<FileIdentity>> = Mutex::new(Vec::new());
 /// # Errors
 /// If it is missing, empty, too large, not a regular file, or cannot be read.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
-    let file = File::open_ambient_with(path, &to_read(), ambient_authority()).map_err(|e| reason(&e));
-    let bytes = file.and_then(content).map_err(|problem| CliError::file(path, problem))?;
+    let bytes = cagework_files::read(path).map_err(|e| CliError::file(path, reason(&e)))?;
     record_input(path);
     Ok(bytes)
 }
@@ -44,21 +38,12 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
 /// If [`read`] would fail, or if the path, or a symbolic link on it, leads out of the folder of `main`. The message has
 /// no subject, because the caller puts the file's name in front of it.
 pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>, String>> {
-    let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
-    match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
-        Ok(file) => {
-            record_input(&folder_of(main).join(relative));
-            Some(content(file))
-        }
-        Err(error) => match error.kind() {
-            ErrorKind::NotFound => None,
-            // cap-std reports a path that leads out of the folder with this kind, and without a system error number.
-            ErrorKind::PermissionDenied if error.raw_os_error().is_none() => {
-                Some(Err("leads out of the model's folder".into()))
-            }
-            _ => Some(Err(format!("cannot be read ({})", reason(&error)))),
-        },
-    }
+    let read = cagework_files::read_beside(main, relative)?;
+    record_input(&folder_of(main).join(relative));
+    Some(read.map_err(|e| match e.raw_os_error() {
+        None => e.to_string(),
+        Some(_) => format!("cannot be read ({})", reason(&e)),
+    }))
 }
 
 /// Replaces each folder by the models in it, ordered by name, without hidden files and without the files `except`.
@@ -95,45 +80,6 @@ fn record_input(path: &Path) {
     INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner).push(FileIdentity::new(path));
 }
 
-/// Returns the options for opening files to read. Opening is non-blocking, because opening a pipe would otherwise wait
-/// for a writer.
-fn to_read() -> OpenOptions {
-    let mut options = OpenOptions::new();
-    options.read(true).nonblock(true);
-    options
-}
-
-/// Reads an open file. The error message has no subject, because the caller puts the file's name in front of it.
-fn content(file: File) -> Result<Vec<u8>, String> {
-    // Ask the open file rather than its path, which another process may replace.
-    let metadata = file.metadata().map_err(|e| reason(&e))?;
-    if metadata.is_dir() {
-        return Err("is a folder, not a file".into());
-    }
-    if !metadata.is_file() {
-        return Err("is a pipe or a device, not a regular file".into());
-    }
-    let too_large = |bytes: u64| {
-        let limit = MAX_FILE_BYTES >> 20;
-        (bytes > MAX_FILE_BYTES)
-            .then(|| format!("is {} MiB large; at most {limit} MiB are read", bytes >> 20))
-    };
-    if let Some(problem) = too_large(metadata.len()) {
-        return Err(problem);
-    }
-    // Files in /proc and similar file systems report a length of 0 as well. They are rejected too, although they are
-    // not empty.
-    if metadata.len() == 0 {
-        return Err("is empty".into());
-    }
-    let mut bytes = Vec::new();
-    let no_memory = || format!("needs {} MiB of memory, more than is available", metadata.len() >> 20);
-    bytes.try_reserve_exact(metadata.len() as usize).map_err(|_| no_memory())?;
-    // The file may have grown since its length was read.
-    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
-    too_large(bytes.len() as u64).map_or(Ok(bytes), Err)
-}
-
 /// Creates a folder and its parents.
 ///
 /// # Errors
@@ -165,13 +111,6 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
 /// Formats a value as indented JSON.
 pub(crate) fn json(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("only structs with text keys are serialized here")
-}
-
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
 }
 
 /// Describes an operating-system error.

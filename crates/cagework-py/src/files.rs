@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
 use cagework_core::rig::Rig;
-use cagework_io::{Clip, Model, Resolve};
+use cagework_io::{Clip, Model, Resolve, shown};
 use glam::DVec3;
 use numpy::PyArray2;
 use pyo3::exceptions::PyTypeError;
@@ -70,29 +70,26 @@ impl Source {
         let model = match self {
             Self::Bytes(bytes) => read("model", bytes, &mut |_| None),
             Self::File(path) => {
-                let bytes = std::fs::read(path).map_err(|e| named(path, &e))?;
-                let folder = path.parent().unwrap_or(Path::new(""));
-                read(&path.to_string_lossy(), &bytes, &mut |name| beside(folder, name))
+                let bytes = cagework_files::read(path).map_err(|e| named(path, &e))?;
+                read(&path.to_string_lossy(), &bytes, &mut |name| beside(path, name))
             }
         };
         model.map_err(error::model)
     }
 }
 
-/// Reads a file that a model refers to. `None` if it does not exist.
-fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    // Canonical paths also detect symbolic links that lead out of the folder.
-    let (folder, path) = (folder.canonicalize().ok()?, folder.join(name).canonicalize().ok()?);
-    if !path.starts_with(folder) {
-        return Some(Err("leads out of the model's folder".into()));
-    }
-    Some(std::fs::read(path).map_err(|e| format!("cannot be read ({e})")))
+/// Reads a file that the model `main` refers to. `None` if it does not exist.
+fn beside(main: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
+    let read = cagework_files::read_beside(main, name)?;
+    Some(read.map_err(|e| match e.raw_os_error() {
+        None => e.to_string(),
+        Some(_) => format!("cannot be read ({e})"),
+    }))
 }
 
 /// Creates the Python exception for an I/O error, such as `FileNotFoundError`; its message contains the file's name.
 fn named(path: &Path, error: &io::Error) -> PyErr {
-    io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+    io::Error::new(error.kind(), format!("{}: {error}", shown(&path.to_string_lossy()))).into()
 }
 
 /// Writes a file.

@@ -1,5 +1,7 @@
 import ast
 import inspect
+import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -56,6 +58,34 @@ def test_invalid_cage_gives_the_error_message_of_the_command(tmp_path):
 def test_errors_have_their_class_and_the_message_of_the_core(call, kind, message):
     with pytest.raises(kind, match=message):
         call()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices")
+def test_pipes_and_devices_are_refused_as_models_buffers_and_bodies(tmp_path):
+    # Opening a pipe without a writer waits forever, and /dev/zero has no end.
+    pipe = tmp_path / "pipe.glb"
+    os.mkfifo(pipe)
+    refused = "is a pipe or a device, not a regular file"
+    for call in [
+        lambda: cw.read_model(pipe),
+        lambda: cw.read_model("/dev/zero"),
+        lambda: cw.reshape(pipe, CUBE, CUBE.vertices),
+        lambda: cw.transfer(pipe, pipe),
+        lambda: cw.generate_cage(*box_triangles(), rig=pipe),
+    ]:
+        with pytest.raises(OSError, match=refused):
+            call()
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        cw.read_model(tmp_path)
+    (tmp_path / "secret.bin").write_bytes(bytes(36))
+    (tmp_path / "models").mkdir()
+    os.mkfifo(tmp_path / "models" / "pipe.bin")
+    os.symlink("../secret.bin", tmp_path / "models" / "link.bin")
+    for uri, message in [("pipe.bin", refused), ("link.bin", "out of the model's folder"), ("../secret.bin", "out of the model's folder")]:
+        model = {"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri": uri}]}
+        (tmp_path / "models" / "model.gltf").write_text(json.dumps(model))
+        with pytest.raises(cw.ModelError, match=message):
+            cw.read_model(tmp_path / "models" / "model.gltf")
 
 
 def test_whole_floats_and_scalars_of_numpy_are_options():

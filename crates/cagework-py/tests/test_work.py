@@ -74,3 +74,15 @@ def test_progress_reports_fractions_and_cancels_by_raising():
     with pytest.raises(StopError):
         cw.bind(np.zeros((1, 3)), cw.Cage(*box(5)), grid=96, progress=progress)
     assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] < 1
+
+
+def test_progress_that_raises_when_it_is_first_called_cancels_a_fine_grid():
+    calls = []
+
+    def progress(fraction):
+        calls.append(fraction)
+        raise ArithmeticError("enough")
+
+    with pytest.raises(ArithmeticError, match="enough"):
+        cw.bind(np.zeros((1, 3)), cw.Cage(*box(5)), grid=160, progress=progress)
+    assert len(calls) == 1

@@ -51,10 +51,16 @@ const RULES: &[Rule] = &[
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
+        name: "cagework-files",
+        may_use: &["cagework-core", "cagework-io", "cagework-pose"],
+        must_not_use: &["wgpu", "naga", "web-sys", "clap"],
+    },
+    Rule {
         name: "cagework-cli",
         may_use: &[
             "cagework-cage",
             "cagework-core",
+            "cagework-files",
             "cagework-gpu",
             "cagework-io",
             "cagework-job",
@@ -64,7 +70,14 @@ const RULES: &[Rule] = &[
     },
     Rule {
         name: "cagework-py",
-        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-job", "cagework-pose"],
+        may_use: &[
+            "cagework-cage",
+            "cagework-core",
+            "cagework-files",
+            "cagework-io",
+            "cagework-job",
+            "cagework-pose",
+        ],
         must_not_use: &["wgpu", "clap"],
     },
     Rule {
