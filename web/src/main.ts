@@ -21,6 +21,7 @@ import { explain, messageOf, textOf } from "./strings";
 import { askAfterCrash } from "./ui/crashed";
 import { createLost } from "./ui/lost";
 import { mount, mountUnsupported } from "./ui/page";
+import { showHiddenCharacters, shown } from "./ui/shown";
 import { createToasts } from "./ui/toasts";
 import { createStage } from "./ui/viewport";
 import { chooseLanguage, T } from "./words";
@@ -45,12 +46,13 @@ async function gallery(): Promise<void> {
     const { showGallery } = await loadPart(import("./gallery/gallery"));
     await showGallery();
   } catch (error) {
-    document.body.textContent = textOf(messageOf(error));
+    document.body.textContent = shown(textOf(messageOf(error)));
   }
 }
 
 async function main(): Promise<void> {
   await chooseLanguage();
+  showHiddenCharacters();
   // gallery.html has the content of index.html. Some servers omit the ending in the address.
   if (/\/gallery(\.html)?$/.test(location.pathname)) return gallery();
   const stage = createStage(byId("stage"));

@@ -15,6 +15,7 @@ import { loadTheme } from "./store";
 import { PageError } from "./strings";
 import { coveredIn } from "./ui/covered";
 import { showReport } from "./ui/crashed";
+import { shown } from "./ui/shown";
 import type { Stage } from "./ui/viewport";
 import { T } from "./words";
 import { hasEntries } from "./works/database";
@@ -50,7 +51,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
     const { bindRun, cageProgress, model } = store.get();
     const share = bindRun?.fraction ?? cageProgress;
     const name = model ? `${model.name} - ${T.product}` : T.product;
-    document.title = share === null ? name : `${percent(share)} - ${name}`;
+    document.title = shown(share === null ? name : `${percent(share)} - ${name}`);
   });
   effect(() => {
     const { model, cage, steps, appliedOptions, tools } = store.get();

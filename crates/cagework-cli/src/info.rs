@@ -7,7 +7,7 @@ use cagework_core::crossing::notices;
 use cagework_core::mesh::weld;
 use cagework_core::words::counted;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Clip, Model, ModelFormat, Vrm, escaped, read_inner_controls, shown};
+use cagework_io::{Clip, Model, ModelFormat, Vrm, read_inner_controls, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -252,11 +252,11 @@ fn text(info: &Info) -> String {
             .join(", "),
         );
         if !vrm.expressions.is_empty() {
-            row("expressions", escaped(&vrm.expressions.join(", ")));
+            row("expressions", listed(&vrm.expressions));
         }
     }
     if !info.props.is_empty() {
-        row("on joints", escaped(&info.props.join(", ")));
+        row("on joints", listed(&info.props));
     }
     if !info.parts.is_empty() {
         row("parts", listed(&info.parts));
@@ -282,7 +282,8 @@ fn text(info: &Info) -> String {
 
 /// Joins names with commas. After [`MAX_LISTED_NAMES`], only the number of further names follows; `--json` lists all.
 fn listed(names: &[String]) -> String {
-    let first = escaped(&names[..names.len().min(MAX_LISTED_NAMES)].join(", "));
+    let first: Vec<String> = names.iter().take(MAX_LISTED_NAMES).map(|name| shown(name)).collect();
+    let first = first.join(", ");
     match names.len().saturating_sub(MAX_LISTED_NAMES) {
         0 => first,
         more => format!("{first} and {more} more (--json lists all)"),

@@ -64,7 +64,7 @@ pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, position_bytes, positions_of, read_project, write_project};
 pub use rigged::{MAX_CLIP_TIMES, UnknownClip};
 pub use select::SelectError;
-pub use shown::{escaped, json_fault, shown, value_fault, without_byte_order_mark};
+pub use shown::{json_fault, shown, value_fault, without_byte_order_mark};
 pub use siblings::{MAX_MODEL_BYTES, Resolve};
 pub use splats::SplatError;
 pub use textures::TexturePlan;

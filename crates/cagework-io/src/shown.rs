@@ -32,8 +32,7 @@ pub fn shown(text: &str) -> String {
 
 /// Escapes control characters, and characters that change the reading direction, in text of a file: a line feed becomes
 /// `\n`, an escape `\u{1b}`.
-#[must_use]
-pub fn escaped(text: &str) -> String {
+fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         // These are the marks, embeddings, overrides and isolates of the Unicode Bidirectional Algorithm (UAX 9,

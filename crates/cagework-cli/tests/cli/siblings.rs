@@ -210,6 +210,29 @@ fn control_characters_in_files_are_printed_as_escapes() {
         .stderr(contains(r"m\u{1b}.gltf: it needs the file 'gone\u{1b}.bin', which").and(escape().not()));
 }
 
+/// A name of 100,000 characters would fill the terminal for a minute.
+#[test]
+fn long_names_are_shortened_wherever_info_lists_them() {
+    let sandbox = with_secret();
+    let mut model = gltf(&[]);
+    let name = |k: usize| format!("{k}\u{202e}{}{k}", "n".repeat(100_000));
+    model["nodes"] = json!([{ "name": name(0), "mesh": 0, "skin": 0 }, { "name": name(1) }]);
+    model["skins"] = json!([{ "joints": [1] }]);
+    model["materials"] = json!([{ "name": name(2) }]);
+    model["meshes"][0]["primitives"][0]["material"] = 0.into();
+    model["scenes"][0]["nodes"] = json!([0, 1]);
+    sandbox.write("model/m.gltf", model.to_string());
+    let output = sandbox.run("info model/m.gltf").success().get_output().stdout.clone();
+    let text = String::from_utf8(output).unwrap();
+    assert!(text.contains(r"material:2\u{202e}nnn") && text.contains("nnn2"), "{text}");
+    assert!(text.lines().all(|line| line.len() < 1000), "{text}");
+    // Programs get the whole names.
+    let output = sandbox.run("info --json model/m.gltf").success().get_output().stdout.clone();
+    let json: Value = serde_json::from_slice(&output).unwrap();
+    let parts = json["parts"].as_array().unwrap();
+    assert!(parts.contains(&format!("material:{}", name(2)).into()), "{parts:?}");
+}
+
 #[test]
 fn file_that_exceeds_the_memory_is_not_reported_as_missing() {
     let sandbox = with_secret();
