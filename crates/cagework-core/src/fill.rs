@@ -31,8 +31,10 @@ pub fn loops(edges: &[[u32; 2]], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<Vec<u3
                 && !ways.is_empty()
             {
                 let before = path.len().checked_sub(2).map(|k| path[k]);
-                let angle = |to: u32| match (before, normals.get(&from)) {
-                    (Some(before), Some(&normal)) => {
+                // Looked up once: thousands of edges may meet at a vertex, and each visit ranks all of them.
+                let normal = normals.get(&from).copied();
+                let angle = |to: u32| match (before, normal) {
+                    (Some(before), Some(normal)) => {
                         let [back, ahead] = [before, to].map(|v| at[v as usize] - at[from as usize]);
                         clockwise(back, ahead, normal)
                     }

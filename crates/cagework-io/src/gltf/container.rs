@@ -64,7 +64,7 @@ pub(crate) fn load(
     check_version(&json)?;
     write_integers(&mut json, false);
     #[cfg(not(feature = "decompress"))]
-    check_compression(name, &json)?;
+    check_compression(name, &json, bin.as_deref(), (bytes.len() as u64, memory_limit))?;
     let (fallbacks, all) = (fallbacks(&json), (0..).zip(json["buffers"].as_array().into_iter().flatten()));
     let uris =
         all.filter(|(number, _)| !fallbacks.contains(number)).filter_map(|(_, buffer)| buffer.get("uri"));
@@ -284,8 +284,17 @@ fn check_version(json: &Value) -> Result<(), GltfError> {
     }
 }
 
+/// Reports compressed geometry, which the caller may decode if it fits the limits. `held`: memory in use, bytes.
+///
+/// # Errors
+/// [`GltfError::Compressed`] if there is compressed geometry, or the error of its price.
 #[cfg(not(feature = "decompress"))]
-fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
+fn check_compression(
+    name: &str,
+    json: &Value,
+    bin: Option<&[u8]>,
+    (held, memory_limit): (u64, u64),
+) -> Result<(), GltfError> {
     let has = |object: &Value, extension: &str| object["extensions"].get(extension).is_some();
     let items = |object: &Value, key: &str| object[key].as_array().cloned().unwrap_or_default();
     for extension in [DRACO].into_iter().chain(MESHOPT) {
@@ -295,6 +304,8 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
             mesh["primitives"].as_array().into_iter().flatten().any(|primitive| has(primitive, extension))
         });
         if required || in_views || in_meshes {
+            let mut budget = Budget::new(held, held, memory_limit, Expansion::GEOMETRY);
+            budget.permit(super::declared::Declared::of(json, bin))?;
             return Err(GltfError::compressed(name, extension, "no decoder is available".into()));
         }
     }

@@ -11,6 +11,8 @@ mod animate;
 mod build;
 mod channels;
 mod container;
+#[cfg(any(test, not(feature = "decompress")))]
+mod declared;
 #[cfg(feature = "decompress")]
 mod decompress;
 mod export;
