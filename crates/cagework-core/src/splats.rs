@@ -5,6 +5,7 @@
 mod harmonics;
 mod outline;
 mod sorted;
+mod split;
 mod stand_in;
 
 use glam::{IVec3, Mat3, Quat, Vec3};
@@ -17,6 +18,7 @@ use crate::team::map_indices;
 pub use harmonics::{MAX_DEGREE, harmonic_basis, n_harmonics, rotate_harmonics};
 pub use outline::{Outline, outlines};
 pub use sorted::{SortedSplats, deform_splats};
+pub use split::SplitSplats;
 
 /// Length of a splat's half axis at which the error of its first-order deformation is measured, standard deviations: a
 /// uniform distribution along an axis of this half length has the same variance as the Gaussian.

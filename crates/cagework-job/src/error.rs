@@ -16,6 +16,12 @@ pub enum JobError {
         /// Name of the option, such as "rigid".
         option: &'static str,
     },
+    /// A rig has no clip to follow.
+    #[error("the rig has no clips: give a file with a clip")]
+    NoClips,
+    /// Only splats are split.
+    #[error("the option split needs a capture of splats, but the model has none: leave it out")]
+    NeedsSplats,
     /// Feet cannot be held without a skeleton.
     #[error(
         "locked feet need a model with a skeleton, and a file that keeps it: leave the feet free, or write a GLB"

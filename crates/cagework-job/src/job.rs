@@ -66,6 +66,7 @@ pub struct Job<'m> {
     kind: Kind,
     options: ResolvedOptions,
     cells: u32,
+    splits: bool,
     ignores_unused: bool,
 }
 
@@ -98,6 +99,8 @@ pub struct Written {
     /// Number of splats for which the deformation differs from its first-order approximation by more than 10 % of half
     /// the longest axis, at an end of this axis.
     pub inexact_splats: usize,
+    /// Number of these splats that were split; 0 unless [`JobOptions::split`] is set.
+    pub split_splats: usize,
     /// Number of frames of a clip that became morph targets.
     pub frames: usize,
     /// What changed beside the shape, and what the format loses, one sentence each.
@@ -142,7 +145,7 @@ impl<'m> Job<'m> {
             _ => options.resolve(job.model(), job.keeps_rig())?,
         };
         let cells = options.cells.unwrap_or(job.cells);
-        Ok(Self { cells, ignores_unused: options.ignores_unused, ..job })
+        Ok(Self { cells, splits: options.split, ignores_unused: options.ignores_unused, ..job })
     }
 
     /// Prepares a body whose skeleton other models share ([`Self::skeleton`]). Options that have no effect on it are
@@ -178,7 +181,9 @@ impl<'m> Job<'m> {
     /// A job with default options.
     fn of_kind(model: JobModel<'m>, format: ModelFormat, shape_only: bool) -> Self {
         let options = ResolvedOptions::default();
-        let mut job = Self { model, format, kind: Kind::Mesh, options, cells: CELLS, ignores_unused: true };
+        let kind = Kind::Mesh;
+        let mut job =
+            Self { model, format, kind, options, cells: CELLS, splits: false, ignores_unused: true };
         let own = job.model();
         job.kind = if own.positions.is_empty() {
             Kind::Clips
@@ -194,6 +199,9 @@ impl<'m> Job<'m> {
 
     /// Checks that every option has an effect on the model.
     fn require_effect(&self, options: &JobOptions) -> Result<(), JobError> {
+        if options.split && self.model().splats().is_none() {
+            return Err(JobError::NeedsSplats);
+        }
         let of_mesh = options.first_for_parts().or_else(|| options.first_for_rigs());
         if let (Kind::Capture, Some(option)) = (self.kind, of_mesh) {
             return Err(JobError::NeedsMesh { option });
@@ -319,7 +327,10 @@ impl<'m> Job<'m> {
             Kind::Frames(clip) => self.model().n_frames(clip)?,
             Kind::Mesh | Kind::Rig | Kind::Clips | Kind::Capture => poses.n_targets(),
         };
-        Ok(self.model().bytes_to_write(self.format) + self.model().bytes_of_poses(n_targets))
+        let bytes = self.model().bytes_to_write(self.format);
+        // Splits at most double the splats, which are then in memory beside the model.
+        let bytes = if self.splits { 2 * bytes + 2 * self.model().bytes() } else { bytes };
+        Ok(bytes + self.model().bytes_of_poses(n_targets))
     }
 
     /// Checks that the model can take these poses in its format.
@@ -423,13 +434,24 @@ impl<'m> Job<'m> {
                 if let Kind::Frames(clip) = self.kind {
                     return self.write_frames(clip, field.as_ref(), written);
                 }
-                written.bytes = match &field {
-                    Some(field) => model.write_in_field(format, field)?,
-                    None => model.write(format, &model.positions)?,
-                };
                 let splats = model.splats().zip(field.as_ref());
+                let split = splats.filter(|_| self.splits && format.holds_splats());
+                let split = split.and_then(|(splats, field)| splats.split(field));
+                written.split_splats = split.as_ref().map_or(0, |split| split.n_split);
+                written.bytes = match (split, &field) {
+                    (Some(split), Some(field)) => {
+                        model.with_splats(split.splats)?.write_in_field(format, field)?
+                    }
+                    (_, Some(field)) => model.write_in_field(format, field)?,
+                    (_, None) => model.write(format, &model.positions)?,
+                };
                 written.inexact_splats = splats.map_or(0, |(splats, field)| splats.n_inexact(field));
-                if written.inexact_splats > 0 {
+                if written.split_splats > 0 {
+                    written.notices.push(format!(
+                        "{} by more than 10 % of the longest axis and became shorter ones.",
+                        counted(written.split_splats, "splat bends", "splats bend")
+                    ));
+                } else if written.inexact_splats > 0 {
                     written.notices.push(format!(
                         "{} by more than 10 % of the longest axis, which an ellipsoid cannot show.",
                         counted(written.inexact_splats, "splat bends", "splats bend")

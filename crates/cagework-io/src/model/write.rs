@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::path::Path;
+use std::sync::Arc;
 
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
@@ -58,6 +59,25 @@ impl Model {
                 self.write(format, &positions)
             }
         }
+    }
+
+    /// A capture with other splats, at rest. Exports are new files, which lack other properties and elements of the
+    /// file that the capture was read from. `splats`: in the axes of [`Self::positions`].
+    ///
+    /// # Errors
+    /// [`WriteError::NoSplats`] if the model is not a capture.
+    pub fn with_splats(&self, splats: Splats) -> Result<Self, WriteError> {
+        let Some(capture) = &self.capture else {
+            let others = ModelFormat::listed(ModelProperty::Faces);
+            return Err(WriteError::NoSplats { format: self.format.export_extension(), others });
+        };
+        let records = match &capture.records {
+            Records::Gltf(color_space) => Records::Gltf(color_space.clone()),
+            _ => Records::New,
+        };
+        let positions = splats.positions.clone();
+        let capture = Some(Arc::new(Capture { splats, file: Vec::new(), records }));
+        Ok(Self { positions, capture, ..self.clone() })
     }
 
     /// Exports a capture with new positions, shapes and spherical harmonics. If `format` is the format of the capture's
