@@ -1,6 +1,6 @@
 //! Joints of a rigged model at rest, and their influences on its vertices.
 
-use glam::Vec3;
+use glam::{DQuat, DVec3, Vec3};
 
 /// A joint of a rigged model, at rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +13,15 @@ pub struct Joint {
     pub at: Vec3,
     /// Humanoid bone that the file's VRM data gives the joint, such as "leftUpperLeg".
     pub bone: Option<String>,
+}
+
+/// A joint at one time of a clip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointFrame {
+    /// Position, object units.
+    pub at: DVec3,
+    /// Rotation from the rest pose, in the axes of the model.
+    pub turn: DQuat,
 }
 
 /// The joints of a rigged model and their influences on its vertices.

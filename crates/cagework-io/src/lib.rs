@@ -46,8 +46,8 @@ pub use blender::write_field_blender;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
 pub use gltf::{
-    Clip, Feet, GltfError, Ground, JointPoint, Joints, PROJECT_EXTENSION, Player, ReshapeOptions,
-    ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,
+    Clip, Feet, GltfError, Ground, JointPlayer, JointPoint, Joints, PROJECT_EXTENSION, Player,
+    ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,
 };
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;

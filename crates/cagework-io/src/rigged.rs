@@ -4,13 +4,13 @@ use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, shells_of_points};
 use cagework_core::words::decimals;
 use cagework_pose::humanoid::{Bone, Humanoid};
-use glam::{DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use thiserror::Error;
 
 use crate::error::WriteError;
 use crate::gltf::{
-    self, Clip, Ground, JointPoint, Player, PointMoves, PoseClip, PoseDisplacements, ReshapeOptions,
-    ReshapeReport, Rig, Skeleton, Vrm,
+    self, Clip, Ground, JointPlayer, JointPoint, Player, PointMoves, PoseClip, PoseDisplacements,
+    ReshapeOptions, ReshapeReport, Rig, Skeleton, Vrm,
 };
 use crate::model::{Document, Model};
 use crate::origin::relative;
@@ -152,6 +152,17 @@ impl Model {
             Document::Gltf(document) => Ok(Some(Player::new(document, document, self.origin)?)),
             Document::Polygons(_) => Ok(None),
         }
+    }
+
+    /// Creates a player for the joints of [`Self::rest_rig`] alone, for figures that follow the clips of this rig.
+    /// Positions as [`Self::positions`].
+    ///
+    /// # Errors
+    /// [`WriteError`] if the model is not a glTF, or a part of the rig cannot be read.
+    pub fn joint_player(&self) -> Result<JointPlayer, WriteError> {
+        let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
+        let to_model = self.up.turn().as_dmat4() * DMat4::from_translation(-self.origin);
+        Ok(JointPlayer::new(document, to_model)?)
     }
 
     /// Creates a player for an export of this model, with vertices in this model's order.

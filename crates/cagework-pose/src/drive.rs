@@ -59,7 +59,16 @@ impl BoneWeights {
         rig: &Rig,
         humanoid: &Humanoid,
     ) -> Self {
-        let skin = skin_of_bones(rig, humanoid);
+        Self::of_rows(cage, rings, positions, &skin_of_bones(rig, humanoid))
+    }
+
+    /// Takes the weights of a cage from weights of the bones at points. `skin`: `[n_points][N_BONES]`
+    pub(crate) fn of_rows(
+        cage: &[Vec3],
+        rings: &[Vec<u32>],
+        positions: &[Vec3],
+        skin: &[[f64; N_BONES]],
+    ) -> Self {
         let total = |row: &[f64; N_BONES]| row.iter().sum::<f64>();
         let skinned: Vec<usize> =
             (0..skin.len().min(positions.len())).filter(|&v| total(&skin[v]) > LEAST).collect();

@@ -6,6 +6,7 @@
 pub mod blend;
 pub mod drive;
 mod ends;
+pub mod figure;
 pub mod humanoid;
 pub mod parts;
 pub mod proportions;

@@ -61,7 +61,8 @@ pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Rest, embed_images, patch};
 pub(crate) use rig::joints_with_vertices;
 pub use rig::{
-    Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
+    Clip, Feet, Ground, JointPlayer, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose,
+    Skeleton, Vrm,
 };
 pub(crate) use rig::{
     PointMoves, PoseDisplacements, Rig, clips, reshape, rest_rig, skeleton, vrm, write_moved, write_targets,

@@ -17,25 +17,15 @@ use crate::gltf::{GltfDocument, GltfError};
 /// # Errors
 /// If the nodes or the weights cannot be read.
 pub(crate) fn rest_rig(document: &GltfDocument, origin: DVec3) -> Result<Option<Rig>, GltfError> {
-    let skins = document.root.skins.iter();
-    let mut all: Vec<usize> = skins.flat_map(|skin| &skin.joints).map(::gltf::json::Index::value).collect();
     let bones = vrm_bones(document);
-    if all.is_empty() {
-        all = holders(document);
-    } else {
-        all.extend(bones.iter().map(|(_, node)| *node));
+    let nodes = joint_nodes(document);
+    if nodes.is_empty() {
+        return Ok(None);
     }
     // Joint of each node that is one.
     let mut joint_of = vec![None; document.root.nodes.len()];
-    let mut nodes = Vec::new();
-    for node in all {
-        if let Some(joint @ None) = joint_of.get_mut(node) {
-            *joint = Some(nodes.len() as u32);
-            nodes.push(node as u32);
-        }
-    }
-    if nodes.is_empty() {
-        return Ok(None);
+    for (joint, &node) in (0..).zip(&nodes) {
+        joint_of[node as usize] = Some(joint);
     }
     // Parents come first in the order.
     let mut parents = vec![None; nodes.len()];
@@ -65,4 +55,19 @@ pub(crate) fn rest_rig(document: &GltfDocument, origin: DVec3) -> Result<Option<
         first.push(influences.len() as u32);
     }
     Ok(Some(Rig { joints, first, influences }))
+}
+
+/// Nodes of the joints of [`rest_rig`]. `[n_joints]`
+pub(super) fn joint_nodes(document: &GltfDocument) -> Vec<u32> {
+    let skins = document.root.skins.iter();
+    let mut all: Vec<usize> = skins.flat_map(|skin| &skin.joints).map(::gltf::json::Index::value).collect();
+    if all.is_empty() {
+        all = holders(document);
+    } else {
+        all.extend(vrm_bones(document).iter().map(|(_, node)| *node));
+    }
+    let mut is_listed = vec![false; document.root.nodes.len()];
+    let is_new =
+        |node: &usize| is_listed.get_mut(*node).is_some_and(|is_listed| !std::mem::replace(is_listed, true));
+    all.into_iter().filter(is_new).map(|node| node as u32).collect()
 }
