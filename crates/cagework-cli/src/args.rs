@@ -2,6 +2,7 @@
 //! starts.
 
 mod cages;
+mod clip;
 mod controls;
 mod field;
 mod many;
@@ -25,6 +26,7 @@ use clap::builder::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use clip::ClipArgs;
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use field::MapArgs;
 pub(crate) use many::RefitArgs;
@@ -170,6 +172,7 @@ pub(crate) enum LatticeFormat {
     keyframes keep their times. Gaussian splats and point clouds take one pose and no weights.\n\n\
     Examples:\n  \
     cagework deform plant.ply --cage cage.obj --pose bent.obj -o bent.ply\n  \
+    cagework deform person.ply --cage cage.obj --rig humanoid.glb --clip Walk --split -o walk.ply\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj --times 0.4,1.2 \
@@ -192,8 +195,14 @@ pub(crate) struct DeformArgs {
     pub(crate) weights: Option<PathBuf>,
     /// Moved cage: the same vertices in the same order. May be given several times. Each keyframe of a clip and each shape
     /// key in the file is a pose.
-    #[arg(long, value_name = "FILE", required = true)]
+    #[arg(long, value_name = "FILE", required_unless_present = "clip")]
     pub(crate) pose: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) clip: ClipArgs,
+    /// Split splats that bend by more than 10 % of their longest axis into shorter ones along it. Such a capture is written
+    /// as a new file.
+    #[arg(long, requires = "output")]
+    pub(crate) split: bool,
     /// Name of a pose and of its morph target; give one per --pose, in the same order [default: the name of the file].
     /// For a file with several poses it precedes the name of the keyframe or shape key.
     #[arg(long, value_name = "NAME", requires = "output", conflicts_with = "dynamic", value_parser = NonEmptyStringValueParser::new())]

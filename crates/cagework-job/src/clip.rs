@@ -4,7 +4,7 @@ use cagework_core::Bounds;
 use cagework_core::rig::Rig;
 use cagework_io::{Clip, JointPlayer, Model};
 use cagework_pose::drive::BoneWeights;
-use cagework_pose::figure::{BentJoint, ClipMaps, Figure, Fit};
+use cagework_pose::figure::{BentJoint, ClipMaps, Figure, Fit, Landmarks};
 use cagework_pose::humanoid::{Bone, Humanoid};
 use glam::{DVec3, Vec3};
 
@@ -12,6 +12,27 @@ use crate::error::JobError;
 
 /// Angle of an elbow or a knee beyond which a cage folds its inner side, degrees ([measured](../../docs/splats.md)).
 pub const MAX_BEND: f64 = 100.0;
+
+/// Surface of a model at rest, and its curve skeleton.
+#[derive(Clone, Debug, Default)]
+pub struct FigureSurface {
+    /// Points, object units. `[n_points]`
+    pub points: Vec<Vec3>,
+    /// Triangles of these points, any soup.
+    pub triangles: Vec<[u32; 3]>,
+    /// Chains of the skeleton: the trunk first, then polylines from it to the tips of limbs. Empty if it has none.
+    pub chains: Vec<Vec<DVec3>>,
+    /// Chain of each point. `[n_points]`, or empty
+    pub chain_of: Vec<u32>,
+}
+
+impl FigureSurface {
+    /// The head, arms and legs; `None` if they are not found.
+    #[must_use]
+    pub fn landmarks(&self) -> Option<Landmarks> {
+        Landmarks::find(&self.points, &self.triangles, &self.chains)
+    }
+}
 
 /// A humanoid rig with clips.
 #[derive(Clone, Debug)]
@@ -35,8 +56,7 @@ impl ClipRig {
         }
         // A file of clips may have no mesh.
         let joints: Vec<Vec3> = rig.joints.iter().map(|joint| joint.at).collect();
-        let bounds = Bounds::around(&model.positions).or(Bounds::around(&joints));
-        let bounds = bounds.map_or([DVec3::ZERO; 2], |b| [b.min.as_dvec3(), b.max.as_dvec3()]);
+        let bounds = corners(if model.positions.is_empty() { &joints } else { &model.positions });
         Ok(Self { rig, humanoid, player, bounds })
     }
 
@@ -46,25 +66,38 @@ impl ClipRig {
         self.player.clips()
     }
 
-    /// Joints at rest.
+    /// Fits the joints to another model: by the limbs of both, or else by their heights; then also returns a sentence that
+    /// says so. `own`: the surface of the rig's model; without points if it has no mesh.
     #[must_use]
-    pub fn figure(&self) -> Figure {
-        Figure::of_rig(&self.rig, &self.humanoid)
+    pub fn fit(&self, own: &FigureSurface, target: &FigureSurface) -> (Fit, Option<String>) {
+        let figure = Figure::of_rig(&self.rig, &self.humanoid);
+        let whose = match (own.landmarks(), target.landmarks()) {
+            (Some(from), Some(to)) => return (Fit::by_limbs(&figure, &from, &to), None),
+            (_, None) => "the model",
+            (None, _) => "the rig's model",
+        };
+        let notice = format!(
+            "No head, two arms and two legs were found in {whose}, so the joints are fitted by the height alone: look at \
+             them, and correct them."
+        );
+        (Fit::by_bounds(&figure, self.bounds, corners(&target.points)), Some(notice))
     }
 
-    /// Corners of the box of the model or, without a mesh, of the joints. Object units
+    /// Lets a cage follow the clips. `target`: surface of the model in the cage; `rest`, `rings`: positions of the controls,
+    /// object units, `[n_controls]`, and loops of them around limbs, as for [`BoneWeights::of_skin`].
     #[must_use]
-    pub fn bounds(&self) -> [DVec3; 2] {
-        self.bounds
-    }
-
-    /// Lets a cage follow the clips. `weights`: of the fitted bones at the controls; `rest`: positions of the controls,
-    /// object units, `[n_controls]`.
-    #[must_use]
-    pub fn drive(self, fit: &Fit, weights: BoneWeights, rest: Vec<Vec3>) -> ClipPoses {
+    pub fn drive(&self, fit: &Fit, target: &FigureSurface, rest: &[Vec3], rings: &[Vec<u32>]) -> ClipPoses {
+        let landmarks = target.landmarks();
+        let limbs = landmarks.as_ref().map(|landmarks| (landmarks, target.chain_of.as_slice()));
+        let weights = BoneWeights::of_figure(rest, rings, &target.points, &fit.figure, limbs);
         let maps = ClipMaps::new(fit, &self.rig, &self.humanoid);
-        ClipPoses { player: self.player, maps, weights, rest }
+        ClipPoses { player: self.player.clone(), maps, weights, rest: rest.to_vec() }
     }
+}
+
+fn corners(points: &[Vec3]) -> [DVec3; 2] {
+    let bounds = Bounds::around(points);
+    bounds.map_or([DVec3::ZERO; 2], |bounds| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])
 }
 
 /// Poses of a cage at the times of clips.

@@ -7,7 +7,7 @@ mod job;
 mod options;
 mod poses;
 
-pub use clip::{ClipPoses, ClipRig, MAX_BEND};
+pub use clip::{ClipPoses, ClipRig, FigureSurface, MAX_BEND};
 pub use error::JobError;
 pub use follow::{BoundPoints, Follow, JobPoints};
 pub use job::{Deformed, Job, JobModel, Written, require_memory};

@@ -69,7 +69,7 @@ pub(crate) struct ProportionsArgs {
     pub(crate) solve: SolveArgs,
 }
 
-fn bone(text: &str) -> Result<(Bone, String), String> {
+pub(super) fn bone(text: &str) -> Result<(Bone, String), String> {
     let (bone, joint) = text.split_once('=').ok_or("expected BONE=JOINT, such as leftHand=Grip_L")?;
     Ok((bone.parse::<Bone>().map_err(|e| e.to_string())?, joint.to_owned()))
 }

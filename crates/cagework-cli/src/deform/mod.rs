@@ -1,5 +1,6 @@
 //! `cagework deform`: deforms a model by poses of its cage.
 
+mod clip;
 mod report;
 
 use std::path::Path;
@@ -31,6 +32,9 @@ const MAX_MISFIT: f64 = 1e-3;
 /// # Errors
 /// If a file cannot be read or written, files do not match, or a bind fails.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
+    if let (Some(clip), Some(rig), Some(output)) = (&args.clip.clip, &args.clip.rig, &args.output) {
+        return clip::run(args, (clip, rig), output, as_json);
+    }
     let mut inputs = vec![args.mesh.as_path()];
     inputs.extend(args.weights.as_deref());
     inputs.extend(args.pose.iter().chain(&args.pose_controls).map(AsRef::<Path>::as_ref));
@@ -117,7 +121,8 @@ fn deform(
 fn job_options(args: &DeformArgs, model: &Model) -> Result<JobOptions, CliError> {
     let clip = args.dynamic.as_deref().map(|name| Clip::named(&model.clips(), name)).transpose();
     let clip = clip.map_err(|e| CliError::file(&args.mesh, e))?;
-    let mut options = JobOptions { clip, cells: Some(args.lattice_cells), ..args.rig.job_options(false) };
+    let cells = Some(args.lattice_cells);
+    let mut options = JobOptions { clip, cells, split: args.split, ..args.rig.job_options(false) };
     options.reshape.expressions = args.expression;
     Ok(options)
 }

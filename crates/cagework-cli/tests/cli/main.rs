@@ -6,6 +6,7 @@ mod bad_input;
 mod bind;
 mod cage_and_info;
 mod cages;
+mod clips;
 mod controls;
 mod deform;
 mod demo;

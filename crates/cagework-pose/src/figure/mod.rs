@@ -102,6 +102,11 @@ impl Figure {
         self.joints[bone as usize]
     }
 
+    /// The bones that the figure has, with their joints. Object units
+    pub fn all(&self) -> impl Iterator<Item = (Bone, DVec3)> {
+        Bone::ALL.iter().filter_map(|(_, bone)| Some((*bone, self.at(*bone)?)))
+    }
+
     /// Moves the joint of a bone that the figure has. `at`: object units.
     pub fn set(&mut self, bone: Bone, at: DVec3) {
         if let Some(joint) = &mut self.joints[bone as usize] {
