@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use crate::error::JobError;
 
-/// Angle of an elbow or a knee beyond which a cage folds its inner side, degrees ([measured](../../docs/splats.md)).
+/// Angle of an elbow or a knee beyond which its inner side collapses, degrees: measured in docs/splats.md.
 pub const MAX_BEND: f64 = 100.0;
 
 /// Surface of a model at rest, and its curve skeleton.

@@ -209,7 +209,7 @@ impl ClipSummary {
         let most = bends.max_by(|a, b| a.1.degrees.total_cmp(&b.1.degrees));
         if beyond > 0 {
             self.notices.push(format!(
-                "in {} an elbow or a knee bends by more than {MAX_BEND} degrees, where a cage folds its inner side",
+                "in {} an elbow or a knee bends by more than {MAX_BEND} degrees, where its inner side collapses",
                 counted(beyond, "frame", "frames")
             ));
         }
