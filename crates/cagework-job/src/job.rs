@@ -66,7 +66,6 @@ pub struct Job<'m> {
     kind: Kind,
     options: ResolvedOptions,
     cells: u32,
-    splits: bool,
     ignores_unused: bool,
 }
 
@@ -99,12 +98,25 @@ pub struct Written {
     /// Number of splats for which the deformation differs from its first-order approximation by more than 10 % of half
     /// the longest axis, at an end of this axis.
     pub inexact_splats: usize,
-    /// Number of these splats that were split; 0 unless [`JobOptions::split`] is set.
-    pub split_splats: usize,
     /// Number of frames of a clip that became morph targets.
     pub frames: usize,
     /// What changed beside the shape, and what the format loses, one sentence each.
     pub notices: Vec<String>,
+}
+
+/// Part of the notice about splats that bend.
+const BENDS: &str = "which an ellipsoid cannot show";
+
+impl Written {
+    /// Replaces the number of splats that bend, and the notice about them, after [`Job::split`].
+    pub fn set_split(&mut self, n_bent: usize, n_split: usize) {
+        self.inexact_splats = n_bent;
+        self.notices.retain(|notice| !notice.contains(BENDS));
+        self.notices.push(format!(
+            "{} by more than 10 % of the longest axis; {n_split} became rows of shorter ones.",
+            counted(n_bent, "splat bends", "splats bend")
+        ));
+    }
 }
 
 /// Returns the memory in use while a bound model is written, bytes: `options.held`, the weights of `points` points, and
@@ -145,7 +157,7 @@ impl<'m> Job<'m> {
             _ => options.resolve(job.model(), job.keeps_rig())?,
         };
         let cells = options.cells.unwrap_or(job.cells);
-        Ok(Self { cells, splits: options.split, ignores_unused: options.ignores_unused, ..job })
+        Ok(Self { cells, ignores_unused: options.ignores_unused, ..job })
     }
 
     /// Prepares a body whose skeleton other models share ([`Self::skeleton`]). Options that have no effect on it are
@@ -181,9 +193,7 @@ impl<'m> Job<'m> {
     /// A job with default options.
     fn of_kind(model: JobModel<'m>, format: ModelFormat, shape_only: bool) -> Self {
         let options = ResolvedOptions::default();
-        let kind = Kind::Mesh;
-        let mut job =
-            Self { model, format, kind, options, cells: CELLS, splits: false, ignores_unused: true };
+        let mut job = Self { model, format, kind: Kind::Mesh, options, cells: CELLS, ignores_unused: true };
         let own = job.model();
         job.kind = if own.positions.is_empty() {
             Kind::Clips
@@ -199,9 +209,6 @@ impl<'m> Job<'m> {
 
     /// Checks that every option has an effect on the model.
     fn require_effect(&self, options: &JobOptions) -> Result<(), JobError> {
-        if options.split && self.model().splats().is_none() {
-            return Err(JobError::NeedsSplats);
-        }
         let of_mesh = options.first_for_parts().or_else(|| options.first_for_rigs());
         if let (Kind::Capture, Some(option)) = (self.kind, of_mesh) {
             return Err(JobError::NeedsMesh { option });
@@ -327,10 +334,7 @@ impl<'m> Job<'m> {
             Kind::Frames(clip) => self.model().n_frames(clip)?,
             Kind::Mesh | Kind::Rig | Kind::Clips | Kind::Capture => poses.n_targets(),
         };
-        let bytes = self.model().bytes_to_write(self.format);
-        // Splits at most double the splats, which are then in memory beside the model.
-        let bytes = if self.splits { 2 * bytes + 2 * self.model().bytes() } else { bytes };
-        Ok(bytes + self.model().bytes_of_poses(n_targets))
+        Ok(self.model().bytes_to_write(self.format) + self.model().bytes_of_poses(n_targets))
     }
 
     /// Checks that the model can take these poses in its format.
@@ -355,6 +359,32 @@ impl<'m> Job<'m> {
             Kind::Mesh | Kind::Rig if skeleton.is_some() => one("a shared skeleton"),
             Kind::Mesh | Kind::Rig => Ok(()),
         }
+    }
+
+    /// Splits the splats that a pose bends by more than 10 % of their longest axis, see `Splats::split` of cagework-core.
+    /// Returns the job of the model with their parts, and the numbers of splats that bend and that were split; `None` if
+    /// none bends. That model has at most twice as many splats ([`Self::bytes_to_split`]).
+    ///
+    /// # Errors
+    /// [`JobError::NeedsSplats`] if the model is not a capture; those of `follow`.
+    pub fn split<F: Follow>(
+        &self,
+        follow: &F,
+        pose: &[Vec3],
+    ) -> Result<Option<(Job<'static>, [usize; 2])>, F::Error> {
+        let splats = self.model().splats().ok_or(JobError::NeedsSplats)?;
+        let split = follow.field(pose)?.and_then(|field| splats.split(&field));
+        let Some(split) = split else { return Ok(None) };
+        let counts = [split.n_bent, split.n_split];
+        let model = self.model().with_splats(split.splats).map_err(JobError::from)?.into();
+        let Self { format, kind, options, cells, ignores_unused, .. } = self.clone();
+        Ok(Some((Job { model, format, kind, options, cells, ignores_unused }, counts)))
+    }
+
+    /// Memory of the job that [`Self::split`] returns, and for writing it, beside this job, bytes.
+    #[must_use]
+    pub fn bytes_to_split(&self) -> u64 {
+        2 * self.model().bytes() + self.model().bytes_to_write(self.format)
     }
 
     /// Deforms the model by poses of the controls.
@@ -434,26 +464,15 @@ impl<'m> Job<'m> {
                 if let Kind::Frames(clip) = self.kind {
                     return self.write_frames(clip, field.as_ref(), written);
                 }
-                let splats = model.splats().zip(field.as_ref());
-                let split = splats.filter(|_| self.splits && format.holds_splats());
-                let split = split.and_then(|(splats, field)| splats.split(field));
-                written.split_splats = split.as_ref().map_or(0, |split| split.n_split);
-                written.bytes = match (split, &field) {
-                    (Some(split), Some(field)) => {
-                        model.with_splats(split.splats)?.write_in_field(format, field)?
-                    }
-                    (_, Some(field)) => model.write_in_field(format, field)?,
-                    (_, None) => model.write(format, &model.positions)?,
+                written.bytes = match &field {
+                    Some(field) => model.write_in_field(format, field)?,
+                    None => model.write(format, &model.positions)?,
                 };
+                let splats = model.splats().zip(field.as_ref());
                 written.inexact_splats = splats.map_or(0, |(splats, field)| splats.n_inexact(field));
-                if written.split_splats > 0 {
+                if written.inexact_splats > 0 {
                     written.notices.push(format!(
-                        "{} by more than 10 % of the longest axis and became shorter ones.",
-                        counted(written.split_splats, "splat bends", "splats bend")
-                    ));
-                } else if written.inexact_splats > 0 {
-                    written.notices.push(format!(
-                        "{} by more than 10 % of the longest axis, which an ellipsoid cannot show.",
+                        "{} by more than 10 % of the longest axis, {BENDS}.",
                         counted(written.inexact_splats, "splat bends", "splats bend")
                     ));
                 }

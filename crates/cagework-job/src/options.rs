@@ -19,8 +19,6 @@ pub struct JobOptions {
     /// Cells along the longest side of the cage in the lattice that deforms splats and points. `None` for the usual
     /// number.
     pub cells: Option<u32>,
-    /// Whether splats that bend by more than 10 % of their longest axis are split along it.
-    pub split: bool,
     /// Whether the same options apply to many models: parts that this model lacks are skipped, as are options that have
     /// no effect on it.
     pub ignores_unused: bool,

@@ -5,10 +5,11 @@
 
 use cagework_core::bind::BindError;
 use cagework_core::progress::NoProgress;
+use cagework_core::splats::Splats;
 use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
 use cagework_io::{Feet, Interpolation, Model, ModelFormat, ReshapeOptions, TimelineError};
 use cagework_job::{BoundPoints, Follow, Job, JobError, JobOptions, NamedPose, PoseTimes, Poses};
-use glam::Vec3;
+use glam::{DVec3, Quat, Vec3};
 
 const TETRAHEDRON: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 const POINTS: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -154,4 +155,44 @@ fn animations_need_morph_targets_and_one_time_each() {
     assert!(matches!(order, JobError::Timeline(TimelineError::Order { .. })), "{order}");
     assert_eq!(two(&PoseTimes::default()).unwrap().timeline(), None, "expressions");
     assert!(two(&cubic).unwrap().timeline().is_some());
+}
+
+#[test]
+fn splats_that_bend_are_split_on_request() {
+    // A long splat, and 14 round ones: splits at most double the splats.
+    let splats = Splats {
+        positions: [vec![Vec3::ZERO], vec![0.9 * Vec3::Y; 14]].concat(),
+        scales: [vec![Vec3::new(0.3, 0.02, 0.02)], vec![Vec3::splat(0.01); 14]].concat(),
+        rotations: vec![Quat::IDENTITY; 15],
+        opacities: vec![0.9; 15],
+        colors: vec![Vec3::ONE; 15],
+        ..Splats::default()
+    };
+    let model = Model::of_splats("capture.ply", splats, DVec3::ZERO).unwrap();
+    let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    let cage = Cage::new(&subdivided_box(bounds, 0.2, [6; 3])).unwrap();
+    let bend = |p: &Vec3| Vec3::new(p.x, p.y + p.x * p.x, p.z);
+    let bent: Vec<Vec3> = cage.positions().iter().map(bend).collect();
+    let job = Job::new(&model, ModelFormat::Ply, &JobOptions::default()).unwrap();
+    let bound = bound(&job, &cage);
+    let write = |job: &Job<'_>| {
+        let written = job.write(job.deform(&bound, &Poses::Shape(bent.clone())).unwrap()).unwrap();
+        let read = Model::read("out.ply", &written.bytes, &mut |_| None).unwrap();
+        (written.inexact_splats, read.splats().unwrap().clone())
+    };
+    let (inexact, whole) = write(&job);
+    assert_eq!((inexact, whole.len()), (1, 15));
+    let (split, counts) = job.split(&bound, &bent).unwrap().unwrap();
+    assert_eq!(counts, [1, 1]);
+    let (_, parts) = write(&split);
+    assert!(parts.len() > 20 && parts.len() <= 30, "{}", parts.len());
+    let field = bound.field(&bent).unwrap().unwrap();
+    for p in &parts.positions[..parts.len() - 14] {
+        // Parts lie on the bent axis, which the pose moves along y only.
+        let on_axis = field.map(Vec3::new(p.x, 0.0, 0.0));
+        assert!(p.distance(on_axis) < 1e-4, "{p} {on_axis}");
+    }
+    assert!(job.split(&bound, cage.positions()).unwrap().is_none(), "nothing bends at rest");
+    let mesh = Job::new(mesh(), ModelFormat::Obj, &JobOptions::default()).unwrap();
+    assert_eq!(mesh.split(&bound, &bent).unwrap_err(), JobError::NeedsSplats);
 }

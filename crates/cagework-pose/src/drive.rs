@@ -109,7 +109,7 @@ impl BoneWeights {
 
     /// Moves the vertices of a cage by one map per bone. `cage`: object units, `[n_cage]`; `maps`: indexed by [`Bone`].
     #[must_use]
-    pub fn drive(&self, cage: &[Vec3], maps: &[Map; N_BONES]) -> Vec<DVec3> {
+    pub fn drive(&self, cage: &[Vec3], maps: &[Map]) -> Vec<DVec3> {
         let moved = |(at, row): (&Vec3, &[f64; N_BONES])| {
             let at = at.as_dvec3();
             let by = |(map, w): (&Map, &f64)| if *w == 0.0 { DVec3::ZERO } else { *w * (map.apply(at) - at) };

@@ -117,8 +117,8 @@ pub(super) fn run(
     }
     let poses = clips.drive(&fit, &surface, &rest, cage.rings());
 
-    let options =
-        BindOptions { memory_limit: memory.bytes(), held: rig_model.bytes(), ..BindOptions::default() };
+    let held = rig_model.bytes() + if args.split { job.bytes_to_split() } else { 0 };
+    let options = BindOptions { memory_limit: memory.bytes(), held, ..BindOptions::default() };
     let at_rest = Poses::Shape(rest.clone());
     let bound = match saved {
         Some(saved) => BoundPoints::from_saved(saved, rest),
@@ -148,9 +148,16 @@ pub(super) fn run(
                 summary.skipped += 1;
                 continue;
             }
-            let written = job.deform(&bound, &Poses::Shape(pose)).and_then(|deformed| job.write(deformed));
-            let written = written.map_err(|e| CliError::job(path, e))?;
+            let of_frame = |e| CliError::job(path, e);
+            let split = if args.split { job.split(&bound, &pose).map_err(of_frame)? } else { None };
+            let own = split.as_ref().map_or(&job, |(job, _)| job);
+            let written = own.deform(&bound, &Poses::Shape(pose)).and_then(|deformed| own.write(deformed));
+            let mut written = written.map_err(of_frame)?;
             write(path, &written.bytes)?;
+            if let Some((_, [n_bent, n_split])) = split {
+                written.set_split(n_bent, n_split);
+                summary.split_splats = summary.split_splats.max(n_split);
+            }
             summary.count(&written);
         }
         summary.output = paths.first().map_or_else(String::new, |path| path.display().to_string());
@@ -223,7 +230,6 @@ impl ClipSummary {
     /// Adds what was written.
     fn count(&mut self, written: &Written) {
         self.inexact_splats = self.inexact_splats.max(written.inexact_splats);
-        self.split_splats = self.split_splats.max(written.split_splats);
         for notice in &written.notices {
             // The counts of splats differ from frame to frame, and are in the summary.
             let is_known = self.notices.contains(notice) || notice.contains("10 % of the longest axis");

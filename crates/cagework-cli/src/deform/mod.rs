@@ -11,7 +11,7 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::words::counted;
 use cagework_core::{BindOptions, Cage};
 use cagework_io::{Clip, Model, SavedWeights, Timeline, shown};
-use cagework_job::{BoundPoints, Job, JobOptions, NamedPose, PoseTimes, Poses};
+use cagework_job::{BoundPoints, Job, JobError, JobOptions, NamedPose, PoseTimes, Poses};
 use glam::Vec3;
 
 use crate::args::{CageSource, ControlArgs, DeformArgs, ModelOutput, SmoothArgs};
@@ -100,15 +100,24 @@ fn deform(
             BoundPoints::from_saved(saved, rest)
         }
         None => {
-            let options = BindOptions { memory_limit: memory.bytes(), ..BindOptions::default() };
+            let held = if args.split { job.bytes_to_split() } else { 0 };
+            let options = BindOptions { memory_limit: memory.bytes(), held, ..BindOptions::default() };
             bind_job(&job, cage.controls(), &poses, &options, &args.mesh)?
         }
     };
     let started = Instant::now();
+    let mut split = None;
+    if let (true, Poses::Shape(pose)) = (args.split, &poses) {
+        split = job.split(&bound, pose).map_err(of_output)?;
+    }
+    let job = split.as_ref().map_or(&job, |(job, _)| job);
     let deformed = job.deform(&bound, &poses).map_err(of_output)?;
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let written = job.write(deformed).map_err(of_output)?;
+    let mut written = job.write(deformed).map_err(of_output)?;
     write(&output.path, &written.bytes)?;
+    if let Some((_, [n_bent, n_split])) = split {
+        written.set_split(n_bent, n_split);
+    }
     subject.set_poses(names, poses.timeline().map(Timeline::seconds));
     subject.count(&written);
     notices.extend(subject.outside_in_words());
@@ -121,8 +130,10 @@ fn deform(
 fn job_options(args: &DeformArgs, model: &Model) -> Result<JobOptions, CliError> {
     let clip = args.dynamic.as_deref().map(|name| Clip::named(&model.clips(), name)).transpose();
     let clip = clip.map_err(|e| CliError::file(&args.mesh, e))?;
-    let cells = Some(args.lattice_cells);
-    let mut options = JobOptions { clip, cells, split: args.split, ..args.rig.job_options(false) };
+    if args.split && model.splats().is_none() {
+        return Err(CliError::job(&args.mesh, JobError::NeedsSplats));
+    }
+    let mut options = JobOptions { clip, cells: Some(args.lattice_cells), ..args.rig.job_options(false) };
     options.reshape.expressions = args.expression;
     Ok(options)
 }

@@ -28,6 +28,8 @@ const SWEEPS: usize = 8;
 pub struct SplitSplats {
     /// All splats; the parts of a splat are at its place in the order.
     pub splats: Splats,
+    /// Number of splats that bend too much for an ellipsoid.
+    pub n_bent: usize,
     /// Number of splats that were split.
     pub n_split: usize,
 }
@@ -41,13 +43,16 @@ impl Splats {
     #[must_use]
     pub fn split(&self, field: &Field) -> Option<SplitSplats> {
         let errors = self.first_order_errors(field);
-        let mut bent: Vec<u32> =
-            (0..self.len() as u32).filter(|&s| errors[s as usize] > MAX_FIRST_ORDER_ERROR).collect();
-        bent.sort_by(|&a, &b| errors[b as usize].total_cmp(&errors[a as usize]));
-        let mut left = self.len();
+        let is_bent = |s: &u32| errors[*s as usize] > MAX_FIRST_ORDER_ERROR;
+        // Sort arrays of integers: the wasm module contains the sort for this type anyway. The bits of positive numbers
+        // ascend as the numbers do.
+        let order = |s: u32| [u32::MAX - errors[s as usize].to_bits(), s, 0];
+        let mut bent: Vec<[u32; 3]> = (0..self.len() as u32).filter(is_bent).map(order).collect();
+        bent.sort_unstable();
+        let (n_bent, mut left) = (bent.len(), self.len());
         let mut sizes = vec![None; self.len()];
         let mut n_split = 0;
-        for splat in bent {
+        for [_, splat, _] in bent {
             let size = (MAX_FIRST_ORDER_ERROR / errors[splat as usize]).clamp(SIZES[0], SIZES[1]);
             let Some(rest) = left.checked_sub(n_parts(size) - 1) else { break };
             (left, sizes[splat as usize]) = (rest, Some(size));
@@ -56,7 +61,7 @@ impl Splats {
         if n_split == 0 {
             return None;
         }
-        Some(SplitSplats { splats: self.in_parts(|splat| sizes[splat]), n_split })
+        Some(SplitSplats { splats: self.in_parts(|splat| sizes[splat]), n_bent, n_split })
     }
 
     /// Replaces splats by parts along their longest axis, which look the same. `size`: standard deviation of the parts of

@@ -71,11 +71,11 @@ impl ClipMaps {
         self.travel
     }
 
-    /// Maps of the bones. `frames`: joints of the rig at one time. `[n_joints]`, in the order of the rig
+    /// Maps of the bones, indexed by [`Bone`]. `frames`: joints of the rig at one time. `[n_joints]`, in the order of the rig
     #[must_use]
-    pub fn at(&self, frames: &[JointFrame]) -> [Map; N_BONES] {
+    pub fn at(&self, frames: &[JointFrame]) -> Vec<Map> {
         let frame = |bone: Bone| frames.get(self.joints[bone as usize]? as usize);
-        let mut maps = [DAffine3::IDENTITY; N_BONES];
+        let mut maps = vec![DAffine3::IDENTITY; N_BONES];
         // Bones follow those above them in the order of `Bone`.
         for &(_, bone) in Bone::ALL {
             let parent = self.figure.parent(bone).map(|parent| maps[parent as usize]);
@@ -91,12 +91,12 @@ impl ClipMaps {
             let linear = DMat3::from_quat(turn.normalize());
             maps[bone as usize] = DAffine3 { matrix3: linear, translation: to - linear * at };
         }
-        maps.map(Map::Affine)
+        maps.into_iter().map(Map::Affine).collect()
     }
 
     /// The elbow or knee that bends furthest under some maps.
     #[must_use]
-    pub fn most_bent(&self, maps: &[Map; N_BONES]) -> Option<BentJoint> {
+    pub fn most_bent(&self, maps: &[Map]) -> Option<BentJoint> {
         let bend = |[upper, lower, end]: [Bone; 3]| {
             let [a, b, c] = [self.figure.at(upper)?, self.figure.at(lower)?, self.figure.at(end)?];
             let [a, b, c] =

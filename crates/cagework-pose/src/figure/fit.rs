@@ -40,7 +40,7 @@ impl Fit {
         let scale = height(to) / height(from).max(f64::MIN_POSITIVE);
         let foot = |[low, high]: [DVec3; 2]| low.midpoint(high).with_y(low.y);
         let map = |p: DVec3| foot(to) + scale * (p - foot(from));
-        Self { figure: rig.mapped(map), turn: DQuat::IDENTITY, source: FitSource::Bounds }
+        Self { figure: rig.mapped(&map), turn: DQuat::IDENTITY, source: FitSource::Bounds }
     }
 
     /// Fits the joints of a rig to the limbs of a figure.
@@ -77,25 +77,25 @@ impl Fit {
             let height = interpolated(&heights, p.y);
             to.middle(height) + scale * (from.aside(p) * to.left + depth * to.forward())
         };
-        let mut figure = rig.mapped(in_trunk);
+        let mut figure = rig.mapped(&in_trunk);
         for (side, (arm, leg)) in chains_of().into_iter().enumerate() {
             let own = |p: DVec3| from.aside(p).abs();
             let other = |p: DVec3| to.aside(p).abs();
             let first = rig.at(arm[0]).map_or(0.0, own);
             let starts = [
-                first_point(&from.arms[side].line, |p| own(p) - first),
-                first_point(&to.arms[side].line, |p| other(p) - scale * first),
+                first_point(&from.arms[side].line, &|p| own(p) - first),
+                first_point(&to.arms[side].line, &|p| other(p) - scale * first),
             ];
             let ways = LimbMap::new(&from.arms[side], &to.arms[side], starts, (turn, scale));
-            figure.place(rig, &arm, |p| ways.map(p));
+            figure.place(rig, &arm, &|p| ways.map(p));
             let hip = rig.at(leg[0]).map_or(0.0, |p| p.y);
             let hip_to = interpolated(&heights, hip);
             let starts = [
-                first_point(&from.legs[side].line, |p| hip - p.y),
-                first_point(&to.legs[side].line, |p| hip_to - p.y),
+                first_point(&from.legs[side].line, &|p| hip - p.y),
+                first_point(&to.legs[side].line, &|p| hip_to - p.y),
             ];
             let ways = LimbMap::new(&from.legs[side], &to.legs[side], starts, (turn, scale));
-            figure.place(rig, &leg, |p| ways.map(p));
+            figure.place(rig, &leg, &|p| ways.map(p));
         }
         for (_, bone) in Bone::ALL {
             figure.ends[*bone as usize] = to.end(*bone);

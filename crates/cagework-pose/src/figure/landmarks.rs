@@ -55,7 +55,7 @@ impl Landmarks {
     ///
     /// `points`, `triangles`: surface of the figure, any soup with valid indices. `chains`: the trunk first, then polylines
     /// from the trunk's axis to a tip. Object units, y up. The two chains with the lowest tips are legs, the one with the highest tip ends at the head, and the
-    /// two longest of the others are arms. The feet show where the figure faces; if they do not, it faces +z.
+    /// two longest of the others are arms, which do not reach the ground. The feet show where the figure faces; if they do not, it faces +z.
     ///
     /// `None` unless all five are found.
     #[must_use]
@@ -83,9 +83,9 @@ impl Landmarks {
         let spine = take(&|a, b| lower(b, a))?;
         let mut arms = [take(&longer)?, take(&longer)?];
         let is_short = |limb: &Limb| length(&limb.line) < LIMB * height;
-        if legs.iter().any(|leg| tip(leg).y > bounds[0].y + FOOT * height)
-            || legs.iter().chain(&arms).any(is_short)
-        {
+        // A figure on four legs has no arms.
+        let stands = |limb: &Limb| tip(limb).y < bounds[0].y + FOOT * height;
+        if !legs.iter().all(stands) || arms.iter().any(stands) || legs.iter().chain(&arms).any(is_short) {
             return None;
         }
         let flat = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
@@ -192,14 +192,14 @@ impl Landmarks {
             let aside = |p: DVec3| (p - self.middle(p.y)).dot(self.left).abs();
             let half = 0.5 * (self.bounds[0].y + leg.line[0].y);
             let least = PART * aside(at_height(&leg.line, half));
-            first_point(&leg.line, |p| aside(p) - least).y
+            first_point(&leg.line, &|p| aside(p) - least).y
         };
         0.5 * (of_leg(&self.legs[0]) + of_leg(&self.legs[1]))
     }
 
     /// Height of the arms where they are at a distance from the trunk's middle.
     pub(super) fn arm_height(&self, aside: f64) -> f64 {
-        let of_arm = |arm: &Limb| first_point(&arm.line, |p| self.aside(p).abs() - aside).y;
+        let of_arm = |arm: &Limb| first_point(&arm.line, &|p| self.aside(p).abs() - aside).y;
         0.5 * (of_arm(&self.arms[0]) + of_arm(&self.arms[1]))
     }
 }
@@ -215,7 +215,7 @@ pub(super) fn length(line: &[DVec3]) -> f64 {
 
 /// First point of a polyline where a function that is linear on its segments is not negative; the last point if it is
 /// negative everywhere.
-pub(super) fn first_point(line: &[DVec3], value: impl Fn(DVec3) -> f64) -> DVec3 {
+pub(super) fn first_point(line: &[DVec3], value: &dyn Fn(DVec3) -> f64) -> DVec3 {
     let crossing = |pair: &[DVec3]| {
         let [a, b] = [value(pair[0]), value(pair[1])];
         if a >= 0.0 {

@@ -107,22 +107,18 @@ impl Figure {
         Bone::ALL.iter().filter_map(|(_, bone)| Some((*bone, self.at(*bone)?)))
     }
 
-    /// Moves the joint of a bone that the figure has. `at`: object units.
-    pub fn set(&mut self, bone: Bone, at: DVec3) {
-        if let Some(joint) = &mut self.joints[bone as usize] {
-            *joint = at;
+    fn mapped(&self, map: &dyn Fn(DVec3) -> DVec3) -> Self {
+        let mut mapped = self.clone();
+        for at in mapped.joints.iter_mut().chain(&mut mapped.ends).flatten() {
+            *at = map(*at);
         }
-    }
-
-    fn mapped(&self, map: impl Fn(DVec3) -> DVec3) -> Self {
-        let all = |of: &[Option<DVec3>; N_BONES]| of.map(|at| at.map(&map));
-        Self { joints: all(&self.joints), ends: all(&self.ends) }
+        mapped
     }
 
     /// Sets joints to the images of those of a rig.
-    fn place(&mut self, rig: &Self, bones: &[Bone], map: impl Fn(DVec3) -> DVec3) {
+    fn place(&mut self, rig: &Self, bones: &[Bone], map: &dyn Fn(DVec3) -> DVec3) {
         for bone in bones {
-            self.joints[*bone as usize] = rig.at(*bone).map(&map);
+            self.joints[*bone as usize] = rig.at(*bone).map(map);
         }
     }
 
@@ -227,31 +223,34 @@ impl BoneWeights {
             let all = landmarks.arms.iter().chain(&landmarks.legs).enumerate();
             Some(all.filter(|(_, limb)| limb.chain == chain).map(|(k, _)| k).collect())
         };
-        let distances = |v: usize| -> [f64; N_BONES] {
+        let mut rows = vec![[f64::INFINITY; N_BONES]; points.len()];
+        let mut near: Vec<Vec<f64>> = vec![Vec::new(); N_BONES];
+        for (v, row) in rows.iter_mut().enumerate() {
             let (p, own) = (points[v].as_dvec3(), own_limbs(v));
-            std::array::from_fn(|bone| {
-                let is_other = outer_limb(Bone::ALL[bone].1)
-                    .is_some_and(|limb| own.as_ref().is_some_and(|own| !own.contains(&limb)));
-                let all = segments[bone].iter().map(|ends| distance(p, *ends));
-                if is_other { f64::INFINITY } else { all.fold(f64::INFINITY, f64::min) }
-            })
-        };
-        let all: Vec<[f64; N_BONES]> = (0..points.len()).map(distances).collect();
-        let mut near: [Vec<f64>; N_BONES] = std::array::from_fn(|_| Vec::new());
-        for row in &all {
-            let closest = (0..N_BONES).min_by(|&a, &b| row[a].total_cmp(&row[b])).unwrap_or_default();
+            let is_other = |limb: usize| own.as_ref().is_some_and(|own| !own.contains(&limb));
+            let mut closest = 0;
+            for &(_, bone) in Bone::ALL {
+                let k = bone as usize;
+                if !outer_limb(bone).is_some_and(is_other) {
+                    row[k] = segments[k].iter().map(|ends| distance(p, *ends)).fold(f64::INFINITY, f64::min);
+                }
+                closest = if row[k] < row[closest] { k } else { closest };
+            }
             near[closest].push(row[closest]);
         }
         let whole = median(&mut near.concat()).max(f64::MIN_POSITIVE);
-        let thickness =
-            near.map(|mut own| if own.is_empty() { whole } else { median(&mut own).max(1e-3 * whole) });
-        let weights = all.iter().map(|row| {
-            let weight = |bone: usize| (row[bone] / thickness[bone]).max(LEAST_DISTANCE).powi(-SHARPNESS);
-            let weights: [f64; N_BONES] = std::array::from_fn(weight);
-            let sum: f64 = weights.iter().sum();
-            if sum > 0.0 { weights.map(|w| w / sum) } else { weights }
-        });
-        Self::of_rows(cage, rings, points, &weights.collect::<Vec<_>>())
+        let thickness: Vec<f64> = near
+            .iter_mut()
+            .map(|own| if own.is_empty() { whole } else { median(own).max(1e-3 * whole) })
+            .collect();
+        for row in &mut rows {
+            for (w, thickness) in row.iter_mut().zip(&thickness) {
+                *w = (*w / thickness).max(LEAST_DISTANCE).powi(-SHARPNESS);
+            }
+            let sum: f64 = row.iter().sum();
+            row.iter_mut().for_each(|w| *w /= sum.max(f64::MIN_POSITIVE));
+        }
+        Self::of_rows(cage, rings, points, &rows)
     }
 }
 

@@ -176,4 +176,6 @@ fn a_model_without_limbs_has_no_landmarks() {
     assert_eq!(Landmarks::find(&points, &[[0, 1, 2]], &[]), None);
     assert_eq!(Landmarks::find(&points, &[[0, 1, 2]], &[vec![DVec3::ZERO, DVec3::Y]]), None);
     assert_eq!(Landmarks::find(&[], &[], &[vec![DVec3::ZERO, DVec3::Y]]), None);
+    let on_four_legs = samples::build("strider").unwrap().mesh;
+    assert_eq!(landmarks_of(&on_four_legs.positions, &on_four_legs.triangles).0, None);
 }
