@@ -404,6 +404,11 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// Number of pairs of quads that meet.
+    pub(super) fn n_crossings(&self) -> usize {
+        faults(&self.positions(), &self.faces()).meeting.len()
+    }
+
     fn faults(&self) -> Vec<u32> {
         let Faults { meeting, mut folded } = faults(&self.positions(), &self.faces());
         folded.extend(meeting.into_flattened());

@@ -58,7 +58,10 @@ const ATTEMPTS: [(f64, f64, bool); 6] = [
 
 /// Index in [`ATTEMPTS`] before which limbs are changed, while there is a change left; and the largest number of attempts.
 const FIRST_REMEDY: usize = 4;
-const MAX_ATTEMPTS: usize = 14;
+const MAX_ATTEMPTS: usize = 11;
+
+/// Pairs of quads of fitted rings that meet, above which moves of single vertices do not help.
+const MAX_CROSSINGS: usize = 6;
 
 /// Share of the work of an attempt that is the fit of rings; the rest is that of vertices.
 const RING_SHARE: f32 = 0.6;
@@ -230,7 +233,7 @@ struct Plan<'a> {
 ///
 /// `positions`: `[n_vertices]`, object units. `triangles`: `[n_triangles]`, any soup. The cage encloses all vertices, and
 /// triangles as sampled at distances of 0.02 diagonals, and of 0.01 if one more attempt suffices. An attempt takes
-/// 0.3 s of one core for 12,000 triangles and 0.5 s for 100,000; there are at most fourteen.
+/// 0.3 s of one core for 12,000 triangles and 0.5 s for 100,000; there are at most eleven.
 ///
 /// # Errors
 /// [`Refusal`] if no attempt passes the checks, or cancellation.
@@ -312,7 +315,9 @@ pub fn generate(
         let thin = thinned(&plan.samples);
         let mut fit = Fit::new(&plan, base, &thin);
         fit.fit_rings(&|done| go_on(RING_SHARE * done))?;
-        fit.fit_vertices(&plan.samples, &|done| go_on(RING_SHARE + (1.0 - RING_SHARE) * done))?;
+        if fit.n_crossings() <= MAX_CROSSINGS {
+            fit.fit_vertices(&plan.samples, &|done| go_on(RING_SHARE + (1.0 - RING_SHARE) * done))?;
+        }
         let (fault, why) = match finish(&fit, &units, skeleton, &fine) {
             Ok(cage) => return Ok(sleeves(&fit, cage, &units, skeleton, positions, triangles)),
             Err(failure) => failure,
