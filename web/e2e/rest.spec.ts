@@ -96,7 +96,7 @@ test("the cage at rest is edited, checked during the drag and bound again", { ta
   await test.step("an edge is split in its middle, and collapsed", async () => {
     await page.keyboard.press("v");
     const [a = 0, b = 0] = await choose(page, 2);
-    const tools = page.getByRole("toolbar", { name: "Reshape the cage" });
+    const tools = page.getByRole("toolbar", { name: "Edit the cage" });
     await tools.getByRole("button", { name: "Split edge" }).click();
     const split = await settled(page, 9);
     const between = [0, 1, 2].map((axis) => ((rest[3 * a + axis] ?? 0) + (rest[3 * b + axis] ?? 0)) / 2);

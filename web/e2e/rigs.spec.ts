@@ -166,7 +166,7 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
 
   await test.step("reshaping ends the clip", async () => {
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
-    await page.getByRole("radio", { name: "Reshape" }).check({ force: true });
+    await page.getByRole("radio", { name: "Edit cage" }).check({ force: true });
     const shows = () => page.evaluate(() => globalThis.cagework?.engine.showsClip);
     await expect.poll(shows).toBe(false);
   });

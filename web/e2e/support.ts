@@ -95,14 +95,14 @@ export async function openWith(page: Page, files: readonly DroppedFile[]): Promi
 
 /**
  * Waits until a model is bound and the status reports no job, except the one that makes splats follow the cage.
- * "Reshaping the cage" names a mode, not a job.
+ * "Editing the cage" names a mode, not a job.
  */
 export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,
   });
   await expect(page.locator("#status")).toHaveText(
-    /^(Ready|Preparing the capture.*|Reshaping the cage.*|.*selected)$/,
+    /^(Ready|Preparing the capture.*|Editing the cage.*|.*selected)$/,
     {
       timeout: 60_000,
     },

@@ -73,12 +73,12 @@ export const cage = {
   clear: "Delete all",
   openControls: "From a file",
   moveThem: (key: string) =>
-    `Drag them like cage vertices. While you reshape the cage (${key} in the view), dragging moves their rest position; otherwise it poses the model.`,
+    `Drag them like cage vertices. While you edit the cage (${key} in the view), dragging moves their rest position; otherwise it poses the model.`,
   shape: "Shape it",
-  reshape: "Reshape the cage",
+  reshape: "Edit the cage",
   reshapeSentence: (key: string) =>
     `Edit the cage itself (${key} in the view). The model stays still and is bound again afterwards.`,
-  tools: "Reshape the cage",
+  tools: "Edit the cage",
   growTip: "Grow the cage until it encloses the model",
   edits: {
     split_edge: "Split edge",

@@ -42,7 +42,7 @@ const commands: { readonly [command in Command]?: string } = {
   see: "The See panel",
   tour: "The tour, eleven stops",
   nextStop: "Next or previous stop of the tour",
-  restMode: "Reshape the cage, or pose",
+  restMode: "Edit the cage, or pose",
   split: "Split an edge",
   collapse: "Collapse an edge",
   extrude: "Extrude a face",

@@ -19,8 +19,9 @@ export const view = {
     "From the back (−Z)",
   ],
   mode: "What dragging changes",
-  modes: { pose: "Pose", rest: "Reshape" },
-  modeTip: (key: string) => `Pose the model, or reshape its cage (${key})`,
+  modes: { pose: "Pose", rest: "Edit cage" },
+  modeTip: (key: string) =>
+    `Pose: cage and model move together. Edit cage: change the cage at rest, the model stays (${key})`,
   gizmos: {
     none: "Select and drag",
     move: "Move gizmo",
@@ -53,7 +54,7 @@ export const status = {
   },
   /** Handles are cage vertices and inner controls. */
   manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
-  reshaping: "Reshaping the cage",
+  reshaping: "Editing the cage",
   ready: "Ready",
   notBound: "Not bound yet",
 };
@@ -68,7 +69,7 @@ export const hints = {
   placing:
     "The control is placed under the pointer, halfway between the model's front and back. Drag to turn the view.",
   restHidden: "The cage is hidden: show it in the See panel, then drag its handles.",
-  rest: "Drag a handle to reshape the cage; the model stays still. Pose, at the top, returns to posing.",
+  rest: "Drag a handle to edit the cage; the model stays still. Pose, at the top, returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
   unbound: "Bind the model so that it follows its cage.",
   /** What a drag does. It depends on the tool and on whether the cage is visible. */
