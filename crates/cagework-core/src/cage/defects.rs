@@ -120,6 +120,19 @@ pub enum CageError {
         /// Index of the component's first face.
         face: u32,
     },
+    /// Too many components lie inside each other.
+    #[error(
+        "cage has {components} components, and too many inside each other: comparing them visits {needed} triangles, \
+         more than the limit of {limit}: remove inner components"
+    )]
+    Nested {
+        /// Number of components.
+        components: usize,
+        /// Triangles to visit.
+        needed: u64,
+        /// Largest number of triangles to visit.
+        limit: u64,
+    },
 }
 
 /// Why a face is invalid.

@@ -14,6 +14,9 @@ const NESTING_SAMPLES: usize = 31;
 /// A point with a winding number of at most this is outside a component, not on its surface.
 const MAX_OUTSIDE_WINDING: f64 = 0.25;
 
+/// Limit on the triangles that the tests of nested components visit. Each takes about 40 ns, so all take 5 s.
+const MAX_NESTING_TRIANGLES: u64 = 1 << 27;
+
 /// Orients the faces of every component away from the solid (outward, or into a cavity) and projects all faces to their
 /// planes. `diagonal`: diagonal of the cage's bounding box.
 pub(super) fn orient(
@@ -44,8 +47,16 @@ pub(super) fn orient(
             return Err(CageError::Flat { component: component as u32, face: faces_of[component][0] as u32 });
         }
     }
+    let others = |component: usize| (0..solids.len()).filter(move |&k| k != component);
+    let cost = |(component, solid): (usize, &Solid)| -> u64 {
+        others(component).map(|k| solid.cost_of_is_inside(&solids[k])).sum()
+    };
+    let needed: u64 = solids.iter().enumerate().map(cost).sum();
+    if needed > MAX_NESTING_TRIANGLES {
+        return Err(CageError::Nested { components: solids.len(), needed, limit: MAX_NESTING_TRIANGLES });
+    }
     for (component, solid) in solids.iter().enumerate() {
-        let depth = (0..solids.len()).filter(|&k| k != component && solid.is_inside(&solids[k])).count();
+        let depth = others(component).filter(|&k| solid.is_inside(&solids[k])).count();
         let cavity = depth % 2 == 1;
         let faces = &faces_of[component];
         if (solid.volume < 0.0) != cavity {
@@ -96,14 +107,27 @@ impl Solid {
         Self { triangles, min, max, volume, area }
     }
 
+    /// Number of points of this component that [`Self::is_inside`] tests; 0 if the bounding boxes decide.
+    fn samples(&self, other: &Self) -> usize {
+        let n = self.triangles.len();
+        if n == 0 || self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
+            return 0;
+        }
+        NESTING_SAMPLES.min(if n.is_multiple_of(2) { n - 1 } else { n })
+    }
+
+    /// Number of triangles that [`Self::is_inside`] visits.
+    fn cost_of_is_inside(&self, other: &Self) -> u64 {
+        self.samples(other) as u64 * other.triangles.len() as u64
+    }
+
     /// Whether this component lies inside `other`; false if they overlap, or without triangles.
     #[must_use]
     pub fn is_inside(&self, other: &Self) -> bool {
-        let n = self.triangles.len();
-        if n == 0 || self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
+        let (n, samples) = (self.triangles.len(), self.samples(other));
+        if samples == 0 {
             return false;
         }
-        let samples = NESTING_SAMPLES.min(if n.is_multiple_of(2) { n - 1 } else { n });
         let windings = (0..samples).map(|k| {
             let [a, b, c] = self.triangles[k * n / samples];
             winding_number((a + b + c) / 3.0, other.triangles.iter().copied()).abs()

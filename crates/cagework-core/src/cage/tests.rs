@@ -368,3 +368,21 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn comparing_nested_components_is_limited() {
+    let nested = |n: usize| {
+        let mut all = PolygonMesh::default();
+        for k in 0..n {
+            let mut cube = cube();
+            cube.positions.iter_mut().for_each(|p| *p *= 1.0 + 1e-3 * k as f32);
+            all = together(&all, &cube);
+        }
+        all
+    };
+    // Every second cube bounds a cavity.
+    assert_eq!(Cage::new(&nested(20)).unwrap().notices().len(), 20);
+    // 2000 cubes of 12 triangles, 11 samples each: 11 * 12 * 2000 * 1999 / 2 triangles.
+    let error = Cage::new(&nested(2000)).unwrap_err().to_string();
+    assert!(error.contains("2000 components") && error.contains("visits 263868000 triangles"), "{error}");
+}

@@ -38,6 +38,10 @@ const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 /// Limit on the joints of all skins. A joint takes up to 0.7 KB in an export, and skins can share their joints.
 const MAX_JOINTS: u64 = 1 << 18;
 
+/// Limit on the text that an export repeats for each node, such as names of morph targets, bytes; or one per byte of the
+/// document, if that is more. The JSON of a mesh counts twice; an export takes up to 1.6 times the count.
+const MAX_COPIED_BYTES: u64 = 1 << 28;
+
 /// Limit on clips.
 const MAX_CLIPS: u64 = 1 << 12;
 
@@ -168,6 +172,7 @@ impl Order for DocumentSize {
             ("clips", self.clips, MAX_CLIPS),
             ("channels of all clips", self.channels, MAX_CHANNELS),
             ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
+            ("bytes of text that every node of a mesh repeats", self.copied, MAX_COPIED_BYTES.max(loaded)),
             ("values of all channels of clips", self.channel_values, MAX_CHANNEL_VALUES.max(loaded)),
             (
                 "elements without data in the file, of all nodes",

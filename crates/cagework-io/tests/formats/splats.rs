@@ -526,10 +526,10 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("declares 50000000 splats"));
     assert!(changed(8, &[0; 4]).contains("it has no splats"));
     assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));
-    // 29 MB of zeros in a small file: the limit is checked before they are decompressed.
+    // 14 MB of zeros in a small file: the limit is checked before they are decompressed.
     let mut bomb = body[..16].to_vec();
-    bomb[8..12].copy_from_slice(&1_000_000_u32.to_le_bytes());
-    bomb.resize(16 + 29_000_000, 0);
+    bomb[8..12].copy_from_slice(&500_000_u32.to_le_bytes());
+    bomb.resize(16 + 14_500_000, 0);
     let bomb = gzip(&bomb);
     let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
     assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");
@@ -537,7 +537,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     bomb[8..12].copy_from_slice(&2_400_000_u32.to_le_bytes());
     bomb.resize(16 + 29 * 2_400_000, 0);
     let unpacked = fault("a.spz", &gzip(&bomb));
-    assert!(unpacked.contains("unpack to 69600000, more than the limit of 32 MiB or 16 times"), "{unpacked}");
+    assert!(unpacked.contains("unpack to 69600000, more than the limit of 20 MiB or 16 times"), "{unpacked}");
 
     let bare = fault("a.spz", &body);
     assert!(
