@@ -17,6 +17,7 @@ import { createProportions } from "./actions/proportions";
 import { createPulling } from "./actions/pull";
 import { createTour } from "./actions/tour";
 import { createView } from "./actions/view";
+import { createWalk } from "./actions/walk";
 import { createWorks } from "./actions/works";
 import type { NamedFile } from "./contract";
 import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
@@ -33,6 +34,7 @@ import { T } from "./words";
 const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
 /** Files of clips must contain their buffers: the file dialog gives no access to files beside them. */
 const CLIPS = ".glb,.gltf";
+const CLIPS_OF_RIGS = ".glb,.gltf,.vrm,.bin";
 const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
 
 /** Media query for windows in which the See panel covers the panel of the step; stage.css has the same query. */
@@ -47,6 +49,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
   const { take, know, made, checked } = followDocument(ctx);
   const edit = createEdit(ctx);
   const poses = createPoses(ctx, edit);
+  const walk = createWalk(ctx, edit);
   const cage = createCage(ctx, { bind, edit, know, made, poses });
   const controls = createControls(ctx, cage.change, edit.setEditingRest);
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
@@ -122,6 +125,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     bind,
     poses,
     proportions,
+    walk,
     clips,
     view,
     files,
@@ -146,6 +150,8 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
     /** Opens the browser's file dialog, and opens the chosen model. */
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
+    /** Opens the file dialog, and lets the cage follow the clips of the chosen rig. */
+    chooseRig: () => choose(CLIPS_OF_RIGS, false, (list) => void walk.open(list)),
     /** Opens the file dialog, and adds the chosen models to the cage. */
     chooseMore: () => choose(MODELS, false, (list) => void models.add(list)),
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),

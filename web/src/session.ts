@@ -27,6 +27,7 @@ import type {
   Repair,
   UpAxis,
   View,
+  WalkInfo,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { once, prepareSample } from "./session/opening";
@@ -238,6 +239,15 @@ async function start(opened: OpenResult & Needs) {
           isGivenUp = true;
         },
       };
+    },
+    /** Fits a humanoid rig with clips to the open models, so that the cage can follow them. */
+    openWalk(read: ReadFile): WalkInfo {
+      const all = load(pkg, read as ReadModel);
+      try {
+        return engine.openWalk(all[0]);
+      } finally {
+        for (const loaded of all) loaded.free();
+      }
     },
     /**
      * Gives a model the joints, joint weights and morph targets of the model `body`, in a worker of its own, as an undo

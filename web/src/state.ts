@@ -131,6 +131,8 @@ export const MODEL_STATE = {
   /** Whether pulls move the whole model. */
   pullWhole: false,
   playing: false,
+  /** The rig whose clips the cage follows; null without one. */
+  walk: null as WalkState | null,
   /** Whether the left and right parts of a humanoid have sliders of their own. */
   apart: false,
   /** The brush that paints which vertices of a model stay in place; null while nothing is painted. */
@@ -229,6 +231,16 @@ export interface Painting {
   readonly radius: number;
   /** Whether the brush removes paint. */
   readonly erase: boolean;
+}
+
+/** Clips of another file that the cage follows. */
+export interface WalkState {
+  /** Name of the file. */
+  readonly name: string;
+  /** Names and lengths of the clips, seconds. */
+  readonly clips: readonly (readonly [name: string, seconds: number])[];
+  /** Index of the clip. */
+  readonly clip: number;
 }
 
 /** A clip and its playback state. */

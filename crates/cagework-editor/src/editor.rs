@@ -24,6 +24,7 @@ use crate::options::{PROPORTIONAL_RADIUS, Tools};
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
+use crate::walk::{Walk, WalkInfo};
 
 /// A document, its history and its selection.
 ///
@@ -52,6 +53,8 @@ pub struct Editor {
     pub hovered: Vec<u32>,
     tools: Tools,
     humanoid: HumanoidCache,
+    /// Rig whose clips the cage follows.
+    walk: Option<Walk>,
     /// Identifier of the last cage that was replaced, and the factors of the proportions that its pose contained.
     replaced: (u32, Proportions),
 }
@@ -451,6 +454,34 @@ impl Editor {
             // `blend` returns one position per control, so this cannot fail.
             let _ = self.set_pose(positions);
         }
+    }
+
+    /// Fits a humanoid rig with clips to the models, so that [`Self::walk_at`] moves the cage. Takes up to seconds.
+    ///
+    /// # Errors
+    /// [`EditError`] without a cage, or if the rig is not a humanoid with clips.
+    pub fn set_walk(&mut self, rig: &Model) -> Result<WalkInfo, EditError> {
+        let (walk, info) = Walk::new(&self.document, rig)?;
+        self.walk = Some(walk);
+        Ok(info)
+    }
+
+    /// The fitted rig, if it was fitted to the current models and cage.
+    fn walk(&self) -> Option<&Walk> {
+        self.walk.as_ref().filter(|walk| walk.key == self.document.key())
+    }
+
+    /// Moves the cage to its pose at a time of a clip of the fitted rig, seconds. Like a gesture, this is not a step of the
+    /// history until it is committed. False if no rig is fitted to these models and this cage.
+    pub fn walk_at(&mut self, clip: usize, seconds: f32) -> bool {
+        let pose = self.walk().map(|walk| walk.poses.at(clip, seconds).0);
+        pose.is_some_and(|pose| self.set_pose(pose).is_ok())
+    }
+
+    /// Joints of the fitted rig in the models at rest, object units. Empty without one.
+    #[must_use]
+    pub fn walk_joints(&self) -> Vec<Vec3> {
+        self.walk().map_or_else(Vec::new, |walk| walk.joints.clone())
     }
 
     /// Share of the movement that each vertex makes in a gesture that starts at `positions`.

@@ -3,6 +3,7 @@
 use cagework_core::options::UnknownWord;
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, WriteError};
+use cagework_job::JobError;
 use cagework_pose::blend::VertexCountError;
 use cagework_pose::humanoid::HumanoidError;
 use cagework_pose::proportions::ProportionError;
@@ -90,6 +91,9 @@ pub enum EditError {
     /// A proportion cannot be set.
     #[error(transparent)]
     Proportion(#[from] ProportionError),
+    /// A rig cannot move the cage.
+    #[error(transparent)]
+    Job(#[from] JobError),
     /// The rig cannot be read.
     #[error(transparent)]
     Rig(#[from] WriteError),

@@ -27,6 +27,7 @@ pub mod rest_edit;
 mod settings;
 mod surface;
 mod view;
+mod walk;
 mod watch;
 
 pub use bound::{BoundDocument, BoundError, BoundModels, KnownGround};
@@ -51,4 +52,5 @@ pub use proportions::FoldSample;
 pub use settings::{DocumentSettings, PoseSettings};
 pub use surface::SurfacePoint;
 pub use view::{DocumentView, PoseView, SelectionView};
+pub use walk::WalkInfo;
 pub use watch::CageWatch;

@@ -311,3 +311,30 @@ fn a_sample_of_the_triangles_folds_where_the_model_does() {
     let exact = cage.ranges(&bound.weights, &bound.frames, models.positions(), models.triangles());
     assert_eq!(sampled, exact);
 }
+
+#[test]
+fn a_cage_follows_the_clip_of_a_fitted_rig_until_the_cage_changes() {
+    let sample = samples::build("humanoid").unwrap();
+    let statue = write_mesh_glb("statue", &sample.mesh, &sample.colours, None).unwrap();
+    let mut editor = opened(&statue);
+    assert!(!editor.walk_at(0, 0.5), "no rig is fitted");
+    let rig = Model::read("rig.glb", &GLB, &mut |_| None).unwrap();
+    let info = editor.set_walk(&rig).unwrap();
+    assert_eq!((info.clips, info.notice), (vec![("Walk".to_owned(), 2.0)], None));
+    let joints: Vec<Vec3> = sample.rig.unwrap().joints.iter().map(|joint| joint.at).collect();
+    for at in editor.walk_joints() {
+        let near = joints.iter().map(|joint| joint.distance(at)).fold(f32::MAX, f32::min);
+        assert!(near < ROUNDING, "the rig fits its own mesh: {at}");
+    }
+    let rest = editor.document().pose.clone();
+    assert!(editor.walk_at(0, 0.5));
+    assert!(farthest(&editor.document().pose, &rest) > 0.2);
+    assert!(!editor.is_pose_committed(), "a frame is no step of the history");
+    editor.revert();
+    assert_eq!(editor.document().pose, rest);
+    let mesh = subdivided_box(editor.bounds().unwrap(), 0.2, [2, 4, 2]);
+    let replace = Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() };
+    editor.apply(replace).unwrap();
+    assert!(!editor.walk_at(0, 0.5) && editor.walk_joints().is_empty());
+    assert!(editor.set_walk(&Model::read("statue.glb", &statue, &mut |_| None).unwrap()).is_err());
+}

@@ -13,7 +13,8 @@ use cagework_core::report::BindReport;
 use cagework_core::{Coordinates, ProgressEvent};
 use cagework_editor::edit::{GestureView, SelectMode};
 use cagework_editor::{
-    CageState, Command, HumanoidInfo, ModelInfo, NUMBERS, PageBindOptions, RigOptions, Settings, fields,
+    CageState, Command, HumanoidInfo, ModelInfo, NUMBERS, PageBindOptions, RigOptions, Settings, WalkInfo,
+    fields,
 };
 use cagework_gpu::render::colormap::Legend;
 use cagework_gpu::render::{CameraView, GizmoPart};
@@ -93,6 +94,7 @@ fn generated_types_are_up_to_date() {
     found.visit::<GrabResult>();
     found.visit::<PullFrame>();
     found.visit::<HumanoidInfo>();
+    found.visit::<WalkInfo>();
     found.visit::<FoldArrays>();
     found.visit::<ProportionRange>();
     found.visit::<Legend>();

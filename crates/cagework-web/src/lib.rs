@@ -46,7 +46,7 @@ const TYPES: &str = r#"
 import type { BindOptions, BindReport, BoundArrays, BuiltSample, CageArrays, CageControls, CageOptions, CageState, Command,
   Coordinates, FoldArrays, Frames, Gesture, GizmoPart, GrabInput, GrabResult, HumanoidInfo, Legend, ModelFormat, ModelInfo, Offsets, OpenContents,
   Problem, Progress, ProportionRange, PullFrame, Repair, RigArrays, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis,
-  View } from "../contract/generated";
+  View, WalkInfo } from "../contract/generated";
 
 /** Column indices and weights from `start` to `end` of sparse rows. */
 export type WeightRows = (start: number, end: number) => Rows | Promise<Rows>;

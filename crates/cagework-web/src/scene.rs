@@ -161,8 +161,14 @@ impl State {
         Marks { points, segments, ..Marks::default() }
     }
 
-    /// Creates the marks of joints: dots for those inside the cage, rings for those outside; empty before a bind.
+    /// Creates the marks of joints: dots for those inside the cage, rings for those outside; empty before a bind. For a
+    /// fitted rig whose clip the cage follows, dots for its joints while the cage is at rest.
     fn joint_marks(&self) -> Marks {
+        let fitted = self.editor.walk_joints();
+        if !fitted.is_empty() {
+            let is_at_rest = self.view.original || *self.pose() == *self.rest().positions;
+            return Marks { points: if is_at_rest { fitted } else { Vec::new() }, ..Marks::default() };
+        }
         let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
         let (Some(mode), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };
         let at = match self.playing.as_ref().filter(|_| !self.view.original) {

@@ -180,6 +180,8 @@ export function createPoses(ctx: Context, edit: Edit) {
         stop();
         return;
       }
+      // Ends a clip that the cage follows.
+      edit.settle();
       if (fittingPoses(store.get()).length === 0) {
         ctx.tell.say(T.pose.saveFirst);
         return;

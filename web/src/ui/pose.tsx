@@ -26,6 +26,7 @@ import {
 import { Icon } from "./icons";
 import { Proportions } from "./proportions";
 import { useTouch } from "./touch";
+import { Walk } from "./walk";
 
 const INTERPOLATIONS = ["step", "linear", "cubic"] as const satisfies readonly Interpolation[];
 
@@ -43,6 +44,7 @@ export function PosePanel({ app }: { app: App }) {
           <Clips app={app} />
         </Section>
       )}
+      <Walk app={app} />
       <Section title={T.pull.title}>
         <PullOptions app={app} />
       </Section>

@@ -17,6 +17,7 @@ mod rest;
 mod scene;
 mod select;
 mod slice;
+mod walk;
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -1586,6 +1586,18 @@ redo: string | null,
  */
 forgotten: number, };
 /**
+ * Clips that the cage can follow, for panels.
+ */
+export type WalkInfo = {
+/**
+ * Names and lengths of the clips, seconds.
+ */
+clips: Array<[string, number]>,
+/**
+ * A sentence if the limbs were not found.
+ */
+notice: string | null, };
+/**
  * Statistics of the stored weights.
  */
 export type WeightStats = {

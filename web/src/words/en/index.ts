@@ -12,6 +12,7 @@ import { did, gesture, pose, pull } from "./pose";
 import { proportions } from "./proportions";
 import { legend, see } from "./see";
 import { eta, hints, keys, status, toast, view } from "./view";
+import { walk } from "./walk";
 import { without } from "./without";
 import { works } from "./works";
 
@@ -27,6 +28,7 @@ const words = {
   somethingWrong: "Something went wrong.",
   fixes,
   failed,
+  walk,
   without,
   link,
   lost,
