@@ -179,3 +179,22 @@ fn a_model_without_limbs_has_no_landmarks() {
     let on_four_legs = samples::build("strider").unwrap().mesh;
     assert_eq!(landmarks_of(&on_four_legs.positions, &on_four_legs.triangles).0, None);
 }
+
+#[test]
+fn a_figure_with_lowered_arms_takes_the_directions_of_the_rig() {
+    let sample = &*SAMPLE;
+    let (mut fit, own) = (sample.fitted_to_itself(), sample.figure());
+    let arm = [Bone::LeftUpperArm, Bone::LeftLowerArm, Bone::LeftHand];
+    let shoulder = own.at(arm[0]).unwrap();
+    for bone in arm {
+        let by = own.at(bone).unwrap() - shoulder;
+        fit.figure.joints[bone as usize] = Some(shoulder + DQuat::from_rotation_z(-0.9) * by);
+    }
+    let maps = ClipMaps::new(&fit, &sample.rig, &sample.humanoid).at(&sample.moved(DAffine3::IDENTITY));
+    for pair in arm.windows(2) {
+        let [from, to] =
+            [pair[0], pair[1]].map(|bone| maps[pair[0] as usize].apply(fit.figure.at(bone).unwrap()));
+        let expected = own.at(pair[1]).unwrap() - own.at(pair[0]).unwrap();
+        assert!((to - from).distance(expected) < ROUNDING, "{}: {} {expected}", pair[0], to - from);
+    }
+}
