@@ -8,7 +8,7 @@
 //! at `x_k = 1.2 s (k - (n - 1) / 2)`, have the standard deviation `s` along this axis, the other two unchanged, and the
 //! opacities `a_k` that solve `1 - prod_k (1 - a_k exp(-(x_j - x_k)^2 / (2 s^2))) = a exp(-x_j^2 / 2)` at each centre
 //! `x_j`: eight sweeps of Gauss-Seidel, clamped to 0 to 1. For `s` from 0.3 to 0.7 and `a` from 0.1 to 0.99, the alpha
-//! differs by at most 2.2 % of the largest one, its integral by at most 1.2 % and its variance by at most 7 %.
+//! differs by at most 2.3 % of the largest one, its integral by at most 1.2 % and its variance by at most 7 %.
 
 use super::{MAX_FIRST_ORDER_ERROR, Splats, n_harmonics};
 use crate::field::Field;
@@ -154,7 +154,7 @@ mod tests {
                 assert!(all.iter().all(|(_, a)| (0.0..=1.0).contains(a)));
                 let (split, own_mass, own_variance) = alpha(&all, size);
                 let worst = whole.iter().zip(&split).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                assert!(worst < 0.022 * f64::from(opacity), "{opacity} {size}: {worst}");
+                assert!(worst < 0.023 * f64::from(opacity), "{opacity} {size}: {worst}");
                 assert!((own_mass / mass - 1.0).abs() < 0.012, "{opacity} {size}: {}", own_mass / mass);
                 assert!((own_variance / variance - 1.0).abs() < 0.071, "{own_variance}");
             }
