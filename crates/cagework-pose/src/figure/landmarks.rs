@@ -55,7 +55,7 @@ impl Landmarks {
     ///
     /// `points`, `triangles`: surface of the figure, any soup with valid indices. `chains`: the trunk first, then polylines
     /// from the trunk's axis to a tip. Object units, y up. The two chains with the lowest tips are legs, the one with the highest tip ends at the head, and the
-    /// two longest of the others are arms, which do not reach the ground. The feet show where the figure faces; if they do not, it faces +z.
+    /// two longest of the others are arms. Nothing but the legs reaches the ground. The feet show where the figure faces; if they do not, it faces +z.
     ///
     /// `None` unless all five are found.
     #[must_use]
@@ -72,20 +72,26 @@ impl Landmarks {
         let ends = [trunk[cut..].to_vec(), trunk[..=cut].iter().rev().copied().collect()];
         all.extend(ends.into_iter().filter(|line| line.len() > 1).map(|line| Limb { line, chain: 0 }));
 
+        let tip = |limb: &Limb| limb.line[limb.line.len() - 1];
+        let stands = |limb: &Limb| tip(limb).y < bounds[0].y + FOOT * height;
+        let standing: Vec<DVec3> = all.iter().filter(|limb| stands(limb)).map(tip).collect();
         let mut take = |better: &dyn Fn(&Limb, &Limb) -> Ordering| {
             let best = (0..all.len()).max_by(|&a, &b| better(&all[a], &all[b]))?;
             Some(all.remove(best))
         };
-        let tip = |limb: &Limb| limb.line[limb.line.len() - 1];
         let lower = |a: &Limb, b: &Limb| tip(b).y.total_cmp(&tip(a).y);
         let longer = |a: &Limb, b: &Limb| length(&a.line).total_cmp(&length(&b.line));
         let mut legs = [take(&lower)?, take(&lower)?];
         let spine = take(&|a, b| lower(b, a))?;
         let mut arms = [take(&longer)?, take(&longer)?];
         let is_short = |limb: &Limb| length(&limb.line) < LIMB * height;
-        // A figure on four legs has no arms.
-        let stands = |limb: &Limb| tip(limb).y < bounds[0].y + FOOT * height;
-        if !legs.iter().all(stands) || arms.iter().any(stands) || legs.iter().chain(&arms).any(is_short) {
+        // A figure with a tip on the ground away from both feet stands on more than two legs.
+        let is_foot = |at: &DVec3| legs.iter().any(|leg| tip(leg).distance(*at) < FOOT * height);
+        if !standing.iter().all(is_foot)
+            || !legs.iter().all(stands)
+            || arms.iter().any(stands)
+            || legs.iter().chain(&arms).any(is_short)
+        {
             return None;
         }
         let flat = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
