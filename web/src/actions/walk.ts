@@ -1,11 +1,14 @@
 /** Lets the cage follow a clip of a humanoid rig that is fitted to the open model. */
 
 import type { NamedFile } from "../contract";
+import type { WalkState } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { attemptLatest, type Context } from "./context";
 import type { Edit } from "./edit";
 import { readModels } from "./read";
+
+const nameOf = (walk: WalkState | null) => walk?.clips[walk.clip]?.[0] ?? null;
 
 export function createWalk(ctx: Context, edit: Pick<Edit, "alsoSettles" | "settle" | "setEditingRest">) {
   const { store, engine } = ctx;
@@ -16,7 +19,7 @@ export function createWalk(ctx: Context, edit: Pick<Edit, "alsoSettles" | "settl
     cancelAnimationFrame(frame);
     frame = undefined;
     engine().revert();
-    store.set({ playing: false });
+    store.set({ playing: false, playingPose: null });
   };
   // Undo steps must not contain a pose of the clip.
   edit.alsoSettles(stop);
@@ -38,7 +41,7 @@ export function createWalk(ctx: Context, edit: Pick<Edit, "alsoSettles" | "settl
     edit.settle();
     edit.setEditingRest(false);
     frame = requestAnimationFrame(step(performance.now()));
-    store.set({ playing: true });
+    store.set({ playing: true, playingPose: nameOf(store.get().walk) });
   };
 
   return {
@@ -63,7 +66,8 @@ export function createWalk(ctx: Context, edit: Pick<Edit, "alsoSettles" | "settl
     choose(clip: number | null) {
       const { walk } = store.get();
       if (clip === null) stop();
-      if (walk) store.set({ walk: clip === null ? null : { ...walk, clip } });
+      const next = walk && clip !== null ? { ...walk, clip } : null;
+      store.set({ walk: next, playingPose: frame === undefined ? null : nameOf(next) });
     },
     toggle() {
       if (frame === undefined) play();
