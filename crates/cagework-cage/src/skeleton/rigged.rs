@@ -178,8 +178,7 @@ fn is_mid(tree: &JointTree, plane: &MirrorPlane, joint: usize) -> bool {
         let distance = plane.image(tree.at[other]).distance(at);
         other != joint && distance < MAX_TWIN_ERROR * at.distance(plane.image(at))
     };
-    plane.has(at)
-        && !tree.parent[joint].is_some_and(|parent| tree.children[parent].iter().any(|c| is_twin(c)))
+    plane.has(at) && !tree.parent[joint].is_some_and(|parent| tree.children[parent].iter().any(is_twin))
 }
 
 /// Merges the children of a joint that reach less far than `limit` into it, unless it has only one child.
