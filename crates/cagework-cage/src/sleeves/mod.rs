@@ -60,7 +60,7 @@ const ATTEMPTS: [(f64, f64, bool); 6] = [
 const FIRST_REMEDY: usize = 4;
 const MAX_ATTEMPTS: usize = 11;
 
-/// Pairs of quads of fitted rings that meet, above which moves of single vertices do not help.
+/// Pairs of quads of fitted rings that meet, above which moves of single vertices are left out after the first attempts.
 const MAX_CROSSINGS: usize = 6;
 
 /// Share of the work of an attempt that is the fit of rings; the rest is that of vertices.
@@ -315,7 +315,7 @@ pub fn generate(
         let thin = thinned(&plan.samples);
         let mut fit = Fit::new(&plan, base, &thin);
         fit.fit_rings(&|done| go_on(RING_SHARE * done))?;
-        if fit.n_crossings() <= MAX_CROSSINGS {
+        if attempt < FIRST_REMEDY || fit.n_crossings() <= MAX_CROSSINGS {
             fit.fit_vertices(&plan.samples, &|done| go_on(RING_SHARE + (1.0 - RING_SHARE) * done))?;
         }
         let (fault, why) = match finish(&fit, &units, skeleton, &fine) {
