@@ -38,6 +38,7 @@ pub(crate) fn job(error: JobError) -> PyErr {
         JobError::Bind(error) => bind(error),
         JobError::NoPoses => array(error),
         JobError::NeedsMesh { .. }
+        | JobError::NeedsSplats
         | JobError::NoFeet
         | JobError::NoVrm { .. }
         | JobError::ClipFormat { .. }
@@ -46,7 +47,8 @@ pub(crate) fn job(error: JobError) -> PyErr {
         | JobError::NoAnimation { .. }
         | JobError::Times { .. }
         | JobError::Timeline(_) => option(error),
-        JobError::NoSkeleton
+        JobError::NoClips
+        | JobError::NoSkeleton
         | JobError::OtherCage { .. }
         | JobError::RigPoints { .. }
         | JobError::Unbound
