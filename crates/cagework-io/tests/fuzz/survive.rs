@@ -3,8 +3,8 @@
 use std::sync::LazyLock;
 
 use cagework_cage::check::{Repair, check, repair};
-use cagework_cage::generate::{CageKind, CageOptions, Symmetry, generate};
-use cagework_cage::skeleton::Skeleton;
+use cagework_cage::generate::{CageKind, CageOptions, Symmetry};
+use cagework_cage::generate_of_kind;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::mesh::Bounds;
@@ -183,7 +183,9 @@ fn as_pose(model: &Model) {
 /// Generates a cage and binds the model to it.
 fn as_model(model: &Model, choice: u32) {
     let flags = |bit: u32| choice >> bit & 1 == 1;
-    let options = CageOptions {
+    // Sleeves take no other options.
+    let figure = CageOptions { kind: CageKind::Skeleton, target: 20 + choice % 80, ..CageOptions::default() };
+    let other = CageOptions {
         target: 8 + choice % 40,
         detail: if flags(15) { 0.028 } else { 0.1 },
         quads: flags(16),
@@ -195,10 +197,10 @@ fn as_model(model: &Model, choice: u32) {
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
         smooth: choice >> 9 & 1,
     };
-    if let Ok(Some(rig)) = model.rest_rig() {
-        let _ = Skeleton::of_rig(&model.positions, &rig);
-    }
-    if let Ok(made) = generate(&model.positions, &model.triangles, &options, &NoProgress) {
+    let options = if flags(17) { figure } else { other };
+    let rig = model.rest_rig().ok().flatten();
+    let made = generate_of_kind(&model.positions, &model.triangles, rig.as_ref(), &options, &NoProgress);
+    if let Ok(made) = made {
         assert_eq!(made.cage.notices(), []);
         let (smooth, options) = (options.smooth, bind_options(choice));
         // If `smooth` is set, the generated cage encloses the model by its subdivided surface, so bind to this surface.
