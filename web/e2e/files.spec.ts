@@ -73,7 +73,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
   await test.step("changed settings of the cage apply when it is made", async () => {
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const gaps = page.getByLabel("Gaps left open");
-    await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertices allow");
+    await expect(gaps).toHaveAttribute("aria-valuetext", "as small as the number of vertices allows");
     await gaps.fill("128");
     await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of the model's size");
     const primary = page.locator(".panel-foot .primary").filter({ visible: true });

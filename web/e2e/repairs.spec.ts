@@ -115,7 +115,7 @@ test("every fault has a button that repairs it", async ({ page }) => {
     // The part is 2 long and 2/512 thick, one cell at a grid of 512; the automatic grid has at most 320. (Powers of two
     // are exact in OBJ files and f32.)
     await card.getByRole("button", { name: /Bind with 512 cells/ }).click();
-    await expect(card.getByText("Fine enough")).toBeVisible();
+    await expect(card.getByText("The grid you chose is fine enough")).toBeVisible();
     await bound(page);
     await page.getByRole("button", { name: "Bind", exact: false }).first().click();
     await expect(

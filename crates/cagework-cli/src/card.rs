@@ -95,7 +95,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     if !report.converged {
         let _ = writeln!(
             out,
-            "warning: delta did not fall below {:e} within {} iterations: raise --max-iterations or --tau",
+            "warning: the bind stopped before it was accurate: delta did not fall below {:e} within {} iterations: raise --max-iterations or --tau",
             report.tau, report.iterations
         );
     }

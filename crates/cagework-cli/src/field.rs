@@ -51,7 +51,10 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
     let (bytes, mapped, lattice, mut notices) = if PointFile::is_named(&name) {
         if ending(&args.points) != ending(&args.output) {
             return Err(CliError::Mismatch {
-                message: format!("{}: points keep their format", shown_path(&args.output)),
+                message: format!(
+                    "{}: points are written in the format that they were read in",
+                    shown_path(&args.output)
+                ),
                 hint: "give the output the extension of the input",
             });
         }

@@ -191,7 +191,7 @@ pub const GRID: Number = Number {
 /// The `tau` option: convergence threshold for delta ([`crate::solve::stop`]).
 pub const TAU: Number = Number {
     name: "tau",
-    help: "Stop when delta falls below this (equation 2 of K. Smith's paper; for multigrid and cg the estimated remaining error)",
+    help: "Accuracy at which the solver stops: the change of the weights, or for multigrid and cg the estimated remaining error (docs/method.md)",
     unit: "fraction of the range of weights",
     allowed: "a number above 0",
     is_allowed: |tau| tau.is_finite() && tau > 0.0,
@@ -210,7 +210,7 @@ pub const MAX_ITERATIONS: Number = Number {
 /// The `sparsify` option: limit on the total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
-    help: "In each row, drop the smallest weights up to this total, then restore the row's sum and rest position",
+    help: "Smaller weights file: for each vertex drop the smallest weights, together at most this, then correct the rest",
     unit: "weight",
     allowed: "0 (keep all weights) or a threshold below 0.1",
     is_allowed: |w| (0.0..0.1).contains(&w),

@@ -97,8 +97,8 @@ pub enum JobError {
     },
     /// The weights do not include all points of the model's rig.
     #[error(
-        "the weights have {given} points of the model's rig, but it has {expected}: bind the model again, or write it \
-         without its rig"
+        "the weights were made for another version of this rig ({given} points, now {expected}): bind the model again, \
+         or write it without its rig"
     )]
     RigPoints {
         /// Number of points with weights.

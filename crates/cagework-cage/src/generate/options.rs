@@ -31,7 +31,7 @@ pub const TARGET: Number = Number {
 /// Range of [`CageOptions::detail`].
 pub const DETAIL: Number = Number {
     name: "detail",
-    help: "Root mean square distance of the cage from the model's shape that is tolerated to save vertices",
+    help: "How far the cage may be from the model (root mean square); larger values give fewer vertices",
     unit: "fraction of the model's longest side",
     allowed: "a fraction of the longest side from 0.005 to 0.2",
     is_allowed: |part| (f64::from(0.005_f32)..=f64::from(0.2_f32)).contains(&part),

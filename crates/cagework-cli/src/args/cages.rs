@@ -153,8 +153,8 @@ pub(crate) struct CheckArgs {
     pub(crate) mesh: Option<PathBuf>,
     #[arg(short, long, help = format!("Report parts of the cage that a grid with this many cells along its longest side does not resolve: {}", GRID.allowed), default_value = "auto", value_parser = parse_grid)]
     pub(crate) grid: u32,
-    /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and makes
-    /// vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces
+    /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and
+    /// attaches a vertex that lies on a neighbour's open edge to that face, drop-degenerate removes faces without area, duplicate faces
     /// and unused vertices, mirror completes half a cage across an open boundary in a plane of constant x, y or z,
     /// fill-holes closes holes, flip orients all faces outward, grow moves vertices outward until the cage encloses the
     /// model.

@@ -39,7 +39,7 @@ pub(crate) struct RefitArgs {
     #[arg(long, value_name = "FILE", requires = "controls")]
     pub(crate) pose_controls: Option<PathBuf>,
     /// Body whose joints the models share: joints with the same name move as in this file, and files of clips without a mesh are
-    /// accepted. Without it, a joint that carries vertices in any of the models is treated as if it did in all of them.
+    /// accepted. Without it, joints with the same name still move by the same distance in all models.
     #[arg(long, value_name = "FILE", conflicts_with = "shape_only")]
     pub(crate) skeleton: Option<PathBuf>,
     /// Folder to write to; created if it does not exist.

@@ -55,7 +55,7 @@ pub(crate) struct FitArgs {
     /// Target positions of points of the model, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) landmarks: Option<PathBuf>,
-    /// Weight of the bending energy relative to the squared distance from the target [default: estimated from the noise of
+    /// Stiffness: larger values bend the model less but miss the targets by more [default: estimated from the noise of
     /// the targets; 1e-5 with fewer than four targets per cage vertex].
     #[arg(long, value_name = "NUMBER")]
     pub(crate) lambda: Option<f64>,

@@ -155,7 +155,7 @@ fn check_inputs(args: &DeformArgs, uses_field: bool) -> Result<(), CliError> {
             "`cagework map` takes controls inside the cage",
         ),
         _ if !uses_field && args.smooth > 0 && args.lattice.is_none() => (
-            "--smooth applies to --dynamic, --lattice, splats and points only: weights contain their steps",
+            "--smooth applies to --dynamic, --lattice, splats and points only: the weights file already says how far the cage is smoothed",
             "leave out --smooth",
         ),
         _ => return Ok(()),

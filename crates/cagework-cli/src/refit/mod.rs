@@ -345,7 +345,7 @@ impl Binder<'_> {
         let n_own = models.iter().filter(|entry| is_own(&entry.outcome)).count();
         if self.args.skeleton.is_none() && n_own > 1 {
             notices.push(format!(
-                "{n_own} models take the travel of clips and the turns of joints from their own vertices: if they share \
+                "in {n_own} models clips may travel different distances and joints may turn differently: if they share \
                  a rig, give its body with --skeleton"
             ));
         }

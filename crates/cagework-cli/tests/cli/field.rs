@@ -121,7 +121,9 @@ fn invalid_points_and_outputs_of_map_are_refused() {
     };
     sandbox.write("words.csv", "a,b,c\nno,numbers,here\n");
     map("words.csv", "out.csv").code(1).stderr(contains("words.csv: line 1 has neither three numbers"));
-    map("probes.csv", "out.obj").code(1).stderr(contains("points keep their format"));
+    map("probes.csv", "out.obj")
+        .code(1)
+        .stderr(contains("points are written in the format that they were read in"));
     map("mesh.obj", "out.csv").code(1).stderr(contains("out.csv"));
     map("probes.csv", "probes.csv").code(1).stderr(contains("probes.csv"));
     sandbox

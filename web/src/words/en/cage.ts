@@ -33,7 +33,7 @@ export const cage = {
   tight: "as tight as possible",
   ofSize: (share: string) => `${share} of the model's size`,
   gaps: "Gaps left open",
-  asVertices: "as the vertices allow",
+  asVertices: "as small as the number of vertices allows",
   from: (share: string) => `from ${share} of the model's size`,
   symmetry: "Symmetric left and right",
   symmetries: { auto: "If the model is", x: "Yes", none: "No" },
@@ -53,10 +53,10 @@ export const cage = {
   steps: "Subdivision steps",
   inside: "Controls inside",
   insideSentence:
-    "Handles inside the model, for places that the cage does not reach. Each moves the model around it.",
+    "Handles inside the model, for places that the cage does not reach. Each moves the part of the model near it.",
   kinds: { point: "Point", line: "Bone", face: "Sheet" },
   kindTips: {
-    point: "A ball that moves the model around it. Click to place it.",
+    point: "A ball that moves the part of the model near it. Click to place it.",
     line: "A line with corners, at which it bends. Click each corner; end with Done, Enter or a second click on the last corner.",
     face: "A wall: the model on one side of it does not follow the model on the other side. Click to place its middle.",
   },
@@ -105,15 +105,15 @@ export const cage = {
   faces: "Faces",
   posesWait: (saved: number) =>
     saved > 0
-      ? "Saved poses belong to the previous cage and return with it."
-      : "The pose belongs to the previous cage and returns with it.",
+      ? "Saved poses fit only the previous cage. Go back to that cage, or carry them over."
+      : "The pose fits only the previous cage. Go back to that cage, or carry it over.",
   bridged: (parts: number, models: number) =>
     `${models > 1 ? "The models have" : "The model has"} ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>
-    `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices you asked for, move Closeness to the right.`,
+    `With fewer vertices than the ${wanted} you asked for, the cage is already within ${share} of the model's size from it. For more, move Closeness to the right.`,
   sparsest: (share: string) =>
-    `These vertices follow the shape within ${share} of its size, the closest setting.`,
-  fineEnough: "Fine enough",
+    `The cage is within ${share} of the model's size from it, the closest setting.`,
+  fineEnough: "The grid you chose is fine enough",
   repairs: {
     weld: () => "Join them",
     drop_degenerate: (n: number) => (n === 1 ? "Remove it" : `Remove all ${n}`),

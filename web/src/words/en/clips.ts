@@ -17,7 +17,7 @@ export const clips = {
   loop: "Loop",
   targets: (n: number) => plural(n, "morph target"),
   follow: "Joints follow the cage",
-  followSentence: "Off: the skeleton stays as it is, for clips and files that share it.",
+  followSentence: "Off: the skeleton does not change, so other files made for it still fit.",
   joints: "Show joints",
   jointsSentence: "A dot for a joint inside the cage, a ring for one outside.",
   rigid: (kept: number, all: number) => `Parts that keep their shape (${kept} of ${all})`,
@@ -43,7 +43,7 @@ export const clips = {
       .join(", "),
   dynamic: "The cage bends the moving model",
   dynamicSentence:
-    "Experimental: the skeleton moves the model, then the cage bends it, for example for squash and stretch. Works best with a cage around the clip (step Cage).",
+    "Experimental: the skeleton moves the model, then the cage bends it, for example for squash and stretch. Works best with a cage that encloses the whole movement (step Cage, Enclose).",
   preparing: "Computing how the cage bends the moving model",
   baked: (name: string) =>
     `The cage bends the moving model: the frames of ${name ? `“${name}”` : "its clip"} are exported as morph targets, without a skeleton.`,

@@ -59,11 +59,11 @@ export const link = {
 };
 
 export const lost = {
-  title: "The graphics device was lost",
+  title: "The connection to the graphics card was lost",
   back: "Restoring everything…",
-  notBack: "The graphics device could not be restored",
+  notBack: "The connection to the graphics card could not be restored",
   kept: "Your work is kept in this browser.",
-  again: "The graphics device was lost again",
+  again: "The connection to the graphics card was lost again",
   others: "Close other programs that use the graphics card, then try again.",
 };
 

@@ -49,7 +49,7 @@ export const exports = {
     `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
   noLink: "Links work for samples only. Save a project to share your own model.",
   noLinkChanged:
-    "Links work only for samples in their original cage, with all parts following it. Save a project to share this one.",
+    "Links work only for samples whose cage and parts you have not changed. Save a project to share this one.",
   saveProject: "Save the project",
   copied: "Link copied. It opens this sample in this pose and view.",
   inAddress: "The link is in the address bar; copy it from there.",

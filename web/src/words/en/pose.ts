@@ -50,7 +50,7 @@ export const pose = {
   timeOf: (name: string) => `Time of ${name}, seconds`,
   motion: "Motion",
   motionOf: (name: string) => `Motion to ${name}`,
-  motionOfAll: "As between poses",
+  motionOfAll: "Same as for all poses",
   between: "Between poses",
   interpolations: { step: "Jump", linear: "Straight", cubic: "Smooth" },
   interpolationTips: {

@@ -19,7 +19,7 @@ export const tourWords = {
   doing: (bind: number, all: number) => (all > 1 ? `Binding, ${bind} of ${all}…` : "Binding…"),
   cells: "Cells",
   ofCells: (grid: number) => `${grid} cells`,
-  tau: "Stop below this change (tau)",
+  tau: "Accuracy (tau)",
   ofTau: (tau: number) => `tau = ${scientific(tau)}`,
   errorOf: (what: string) => `Rest error, mean, ${what}`,
   meanError: "Mean rest error of the published method, relative to the cage's size",
