@@ -33,7 +33,7 @@ export const view = {
   add: "Add to the selection",
   see: "See: colours, grid, comparison",
   frame: "Frame everything",
-  ofPlain: (coordinates: string) => `${coordinates}, without smoothing and inner controls`,
+  ofPlain: (coordinates: string) => `${coordinates}, cage only`,
   done: "Done",
   cancel: "Cancel",
 };
