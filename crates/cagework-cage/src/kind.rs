@@ -22,8 +22,8 @@ use crate::sleeves::{self, SleeveError, Sleeves};
 /// Score of a cage whose whole surface spans two limbs, in diagonals of the model's box.
 const SPANNING: f64 = 0.1;
 
-/// Score of a cage without rings, in diagonals of the model's box.
-const NO_RINGS: f64 = 0.02;
+/// Score of a cage without rings, in diagonals of the model's box: with a rig, and without one.
+const NO_RINGS: [f64; 2] = [0.02, 0.01];
 
 /// Score of sleeves if no limb has a ring, in diagonals of the model's box.
 const NO_LIMBS: f64 = 0.1;
@@ -36,7 +36,7 @@ const SLEEVE_SHARE: f32 = 0.7;
 /// With [`CageKind::Auto`], the cage consists of sleeves if they enclose the model and have a lower score than the shell;
 /// otherwise [`CageReport::refusal`] says why it does not. The score is a mean distance: that of the cage's surface from
 /// the model, in diagonals of the model's box, plus 0.1 times the share of its area whose corners are nearest to two
-/// different limbs, plus 0.02 without rings, or 0.1 times the share of the limbs that share the rings of their parent.
+/// different limbs, plus 0.02 without rings (0.01 without a rig), or 0.1 times the share of the limbs that share the rings of their parent.
 /// Models without a rig keep a shell that has at most three quarters of the vertices of the sleeves.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
@@ -80,7 +80,8 @@ pub fn generate_with_skeleton(
         (CageKind::Auto, Err(refusal)) => with_refusal(shell(&model, options, progress)?, refusal),
         (CageKind::Auto, Ok((made, skeleton))) => {
             let shell = shell(&model, options, progress)?;
-            let [own, other] = [&made, &shell].map(|made| score(made, &model, &skeleton));
+            let no_rings = NO_RINGS[usize::from(rig.is_none())];
+            let [own, other] = [&made, &shell].map(|made| score(made, &model, &skeleton, no_rings));
             let [n_sleeves, n_shell] = [made.report.vertices, shell.report.vertices];
             // Corners of a simple shape, such as a cylinder, look like limbs in its voxels.
             if rig.is_none() && 4 * n_shell <= 3 * n_sleeves {
@@ -213,7 +214,7 @@ fn with_refusal(mut made: GeneratedCage, refusal: String) -> GeneratedCage {
 
 /// Score of a cage, see [`generate_of_kind`]. The mean distance is the integral over the cage's triangles, of which the
 /// middles of the edges are the nodes: exact for quadratic functions.
-fn score(made: &GeneratedCage, model: &TriMesh, skeleton: &Skeleton) -> f64 {
+fn score(made: &GeneratedCage, model: &TriMesh, skeleton: &Skeleton, no_rings: f64) -> f64 {
     let (at, triangles) = (made.cage.positions(), made.cage.triangles());
     let corners = |t: &[u32; 3]| t.map(|v| at[v as usize]);
     let middles: Vec<Vec3> = triangles
@@ -238,7 +239,7 @@ fn score(made: &GeneratedCage, model: &TriMesh, skeleton: &Skeleton) -> f64 {
     }
     let diagonal =
         cagework_core::Bounds::around(&model.positions).map_or(1.0, |bounds| f64::from(bounds.diagonal()));
-    let rings = made.rings.as_ref().map_or(NO_RINGS, |rings| {
+    let rings = made.rings.as_ref().map_or(no_rings, |rings| {
         NO_LIMBS * (1.0 - rings.chains.len() as f64 / skeleton.chains.len() as f64)
     });
     (distance / diagonal + SPANNING * spanning) / area.max(f64::MIN_POSITIVE) + rings
@@ -330,7 +331,7 @@ mod tests {
         assert!(are_apart(&skeleton, Some(1), Some(2)) && !are_apart(&skeleton, Some(0), Some(2)));
         let hull = CageOptions { kind: CageKind::Hull, target: 24, ..CageOptions::default() };
         let [hull, sleeves] = [hull, CageOptions { kind: CageKind::Skeleton, ..CageOptions::default() }]
-            .map(|options| score(&made(&figure, &options).unwrap(), &model, &skeleton));
+            .map(|options| score(&made(&figure, &options).unwrap(), &model, &skeleton, NO_RINGS[0]));
         assert!(sleeves < 0.5 * hull, "{sleeves} {hull}");
     }
 }

@@ -269,6 +269,8 @@ pub fn generate(
     let [coarse, fine] = [points(&unmirrored), points(&checked)];
     let mut refusal = None;
     let mut remedies = Remedies::default();
+    // A curve skeleton has one bone per chain. Its limbs are not changed: soups would take a minute.
+    let has_rig = skeleton.bone_of != skeleton.chain_of;
     // Encloses only the samples to which sleeves are fitted. Used if the next attempt does not enclose all points.
     let mut enclosing = None;
     let mut next = 0;
@@ -334,7 +336,7 @@ pub fn generate(
         let mut learnt = remedies.clone();
         learnt.learn(&fit, &fault);
         next += 1;
-        if next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
+        if has_rig && next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
             // The rings to avoid were those of other limbs.
             learnt.avoided.clear();
             next = FIRST_REMEDY - 1;
