@@ -1,6 +1,5 @@
 //! The cage follows the clip of a rig that is fitted to the models.
 
-use cagework_cage::skeleton::Skeleton;
 use cagework_core::progress::NoProgress;
 use cagework_io::{Clip, Model};
 use cagework_job::{ClipPoses, ClipRig, FigureSurface};
@@ -42,6 +41,9 @@ impl Walk {
             return Err(EditError::NoCage);
         }
         let clips = ClipRig::new(rig, &[])?;
+        // `NoProgress` does not cancel.
+        let surface_of =
+            |(points, triangles)| FigureSurface::new(points, triangles, &NoProgress).unwrap_or_default();
         let own = rig.states(None).map_or_else(|_| FigureSurface::default(), surface_of);
         let surface = surface_of(document.models.states(None).map_err(|_| EditError::NoModel)?);
         let (fit, notice) = clips.fit(&own, &surface);
@@ -52,13 +54,4 @@ impl Walk {
         let joints = fit.figure.all().map(|(_, at)| at.as_vec3()).collect();
         Ok((Self { poses, joints, key: document.key() }, info))
     }
-}
-
-/// Surface of models with its curve skeleton; without chains if it has none.
-fn surface_of((points, triangles): (Vec<Vec3>, Vec<[u32; 3]>)) -> FigureSurface {
-    let (chains, chain_of) = match Skeleton::of_surface(&points, &triangles, &NoProgress) {
-        Ok(skeleton) => (skeleton.chains.into_iter().map(|chain| chain.at).collect(), skeleton.chain_of),
-        Err(_) => (Vec::new(), Vec::new()),
-    };
-    FigureSurface { points, triangles, chains, chain_of }
 }

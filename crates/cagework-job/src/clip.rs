@@ -1,6 +1,8 @@
 //! Poses of a cage that follow the clip of a rig, for captures and for models without a rig of their own.
 
+use cagework_cage::skeleton::{Skeleton, SkeletonError};
 use cagework_core::Bounds;
+use cagework_core::progress::{Cancellation, Progress};
 use cagework_core::rig::Rig;
 use cagework_io::{Clip, JointPlayer, Model};
 use cagework_pose::drive::BoneWeights;
@@ -27,6 +29,23 @@ pub struct FigureSurface {
 }
 
 impl FigureSurface {
+    /// Derives the curve skeleton of a surface. `points`, `triangles`: as in [`Self::points`], [`Self::triangles`].
+    ///
+    /// # Errors
+    /// If `progress` cancels.
+    pub fn new(
+        points: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        progress: &dyn Progress,
+    ) -> Result<Self, Cancellation> {
+        let (chains, chain_of) = match Skeleton::of_surface(&points, &triangles, progress) {
+            Ok(skeleton) => (skeleton.chains.into_iter().map(|chain| chain.at).collect(), skeleton.chain_of),
+            Err(SkeletonError::Cancelled(cancelled)) => return Err(cancelled),
+            Err(_) => Default::default(),
+        };
+        Ok(Self { points, triangles, chains, chain_of })
+    }
+
     /// The head, arms and legs; `None` if they are not found.
     #[must_use]
     pub fn landmarks(&self) -> Option<Landmarks> {

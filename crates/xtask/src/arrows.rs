@@ -40,7 +40,7 @@ const RULES: &[Rule] = &[
     },
     Rule {
         name: "cagework-job",
-        may_use: &["cagework-core", "cagework-io", "cagework-pose"],
+        may_use: &["cagework-cage", "cagework-core", "cagework-io", "cagework-pose"],
         // wasm-bindgen is allowed: on wasm32, cagework-io depends on it through zip.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },

@@ -112,7 +112,8 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
 
   /** Saves a pending change while the page is being left. */
   const saveLast = () => {
-    if (timer === undefined || !hasWork()) return;
+    // While an animation plays, the cage is in a pose that is not part of the work.
+    if (timer === undefined || !hasWork() || store.get().playing) return;
     clearTimeout(timer);
     timer = undefined;
     try {

@@ -102,8 +102,11 @@ it("a change is saved 50 ms later, or at once when the page is left, also during
   kept.clear();
   listeners.get("pagehide")?.();
   expect(kept.size, "nothing changed").toBe(0);
-  store.set({ gesture: "Move" });
+  store.set({ gesture: "Move", playing: true });
   works.touch();
+  listeners.get("pagehide")?.();
+  expect(kept.size, "an animation plays").toBe(0);
+  store.set({ playing: false });
   listeners.get("pagehide")?.();
   expect(kept.get("work0")?.entry.when).toBe(Date.now());
 });

@@ -112,6 +112,7 @@ pub(super) fn of_surface(
         offset: plane.offset,
         is_symmetric: plane.is_symmetric,
         is_biped,
+        is_rigged: false,
     };
     if plane.is_symmetric {
         skeleton.chains.iter_mut().for_each(|chain| chain.is_symmetric = true);

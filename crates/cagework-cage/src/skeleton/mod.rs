@@ -56,6 +56,8 @@ pub struct Skeleton {
     pub is_symmetric: bool,
     /// Whether the legs run against the spine, so that the trunk ends at the hips.
     pub is_biped: bool,
+    /// Whether the chains follow the joints of a rig, not a curve skeleton of voxels.
+    pub is_rigged: bool,
 }
 
 /// Why a model has no skeleton.

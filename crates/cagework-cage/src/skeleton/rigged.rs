@@ -91,6 +91,7 @@ pub(super) fn of_rig(positions: &[Vec3], rig: &Rig) -> Result<Skeleton, Skeleton
         offset: plane.offset,
         is_symmetric: plane.is_symmetric,
         is_biped,
+        is_rigged: true,
     };
     plane.mark_symmetry(&mut skeleton, positions);
     Ok(skeleton)

@@ -56,11 +56,15 @@ const ATTEMPTS: [(f64, f64, bool); 6] = [
     (0.7, 0.5 * CLEARANCE, true),
 ];
 
-/// Index in [`ATTEMPTS`] before which limbs are changed, while there is a change left; and the largest number of attempts.
+/// Number of [`ATTEMPTS`] before limbs are changed. The last of them is repeated after each change. If there is no change
+/// left, the rest of [`ATTEMPTS`] follows.
 const FIRST_REMEDY: usize = 4;
+
+/// Largest number of attempts.
 const MAX_ATTEMPTS: usize = 11;
 
-/// Pairs of quads of fitted rings that meet, above which moves of single vertices are left out after the first attempts.
+/// Number of pairs of quads that meet after the fit of rings, above which the fit of vertices is left out: it does not
+/// separate them. The first attempts have it in any case.
 const MAX_CROSSINGS: usize = 6;
 
 /// Share of the work of an attempt that is the fit of rings; the rest is that of vertices.
@@ -269,8 +273,6 @@ pub fn generate(
     let [coarse, fine] = [points(&unmirrored), points(&checked)];
     let mut refusal = None;
     let mut remedies = Remedies::default();
-    // A curve skeleton has one bone per chain. Its limbs are not changed: soups would take a minute.
-    let has_rig = skeleton.bone_of != skeleton.chain_of;
     // Encloses only the samples to which sleeves are fitted. Used if the next attempt does not enclose all points.
     let mut enclosing = None;
     let mut next = 0;
@@ -336,7 +338,8 @@ pub fn generate(
         let mut learnt = remedies.clone();
         learnt.learn(&fit, &fault);
         next += 1;
-        if has_rig && next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
+        // Models without a rig may be soups of many points, for which each attempt takes seconds.
+        if skeleton.is_rigged && next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
             // The rings to avoid were those of other limbs.
             learnt.avoided.clear();
             next = FIRST_REMEDY - 1;

@@ -71,6 +71,7 @@ fn figure(half_gap: f32) -> Figure {
             offset: 0.0,
             is_symmetric: true,
             is_biped: true,
+            is_rigged: true,
         },
     };
     let limbs = [

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_cage::skeleton::{Skeleton, SkeletonError};
 use cagework_core::BindOptions;
 use cagework_core::bind::BindError;
 use cagework_core::words::{counted, decimals};
@@ -57,15 +56,9 @@ struct MostBent {
     seconds: f32,
 }
 
-/// Surface of a model with its curve skeleton; without chains if it has none.
 fn surface_of(model: &Model) -> Result<FigureSurface, CliError> {
     let (points, triangles) = states_of(model, None)?;
-    let (chains, chain_of) = match Skeleton::of_surface(&points, &triangles, &Bar::start()) {
-        Ok(skeleton) => (skeleton.chains.into_iter().map(|chain| chain.at).collect(), skeleton.chain_of),
-        Err(SkeletonError::Cancelled(e)) => return Err(BindError::Cancelled(e).into()),
-        Err(_) => (Vec::new(), Vec::new()),
-    };
-    Ok(FigureSurface { points, triangles, chains, chain_of })
+    FigureSurface::new(points, triangles, &Bar::start()).map_err(|e| BindError::Cancelled(e).into())
 }
 
 /// Runs `cagework deform --clip`.
