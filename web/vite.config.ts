@@ -1,32 +1,10 @@
 import { createHash } from "node:crypto";
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
-import { defineConfig, type Plugin, type Rolldown } from "vite";
+import { defineConfig, type Plugin } from "vite";
 
-/** Files in which Vite lists the licences of bundled packages. crates/xtask/src/licences.rs reads and deletes them. */
-export const LICENCES = { page: "licences-npm.json", workers: "licences-npm-workers.json" };
-
-/** Vite's licence plugin. It covers only the page, so `licencesOfWorkers` also calls it for the bundles of workers. */
-let licences: Plugin | undefined;
-export const findLicences: Plugin = {
-  name: "find-licences",
-  configResolved({ plugins }) {
-    licences = plugins.find(({ name }) => name === "vite:license");
-  },
-};
-export const licencesOfWorkers = (): Plugin => ({
-  name: "licences-of-workers",
-  generateBundle(options, bundle, isWrite) {
-    const generate = licences?.generateBundle as Rolldown.FunctionPluginHooks["generateBundle"] | undefined;
-    if (!generate) throw new Error("Vite has no plugin vite:license any more");
-    const emitFile = ({ source }: Rolldown.EmittedAsset) =>
-      this.emitFile({ type: "asset", fileName: LICENCES.workers, source });
-    return generate.call({ ...this, environment: this.environment, emitFile }, options, bundle, isWrite);
-  },
-});
-
-/** Vite's warning about Node modules that gltf-transform and draco3dgltf import, but use only in Node. */
-export const NODE_MODULE_WARNING = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
+/** File in which Vite lists the licences of bundled packages. crates/xtask/src/licences.rs reads and deletes it. */
+export const LICENCES = "licences-npm.json";
 
 const PUBLIC_FOLDER = join(import.meta.dirname, "public");
 
@@ -36,8 +14,7 @@ const writeServiceWorker: Plugin = {
   generateBundle: {
     order: "post",
     handler(_, bundle) {
-      const isLicences = (name: string) => Object.values(LICENCES).includes(name);
-      const built = Object.values(bundle).filter(({ fileName }) => !isLicences(fileName));
+      const built = Object.values(bundle).filter(({ fileName }) => fileName !== LICENCES);
       const entry = built.find((file) => file.type === "chunk" && file.isEntry)?.fileName;
       if (!entry) throw new Error("the build has no entry");
       const named = readdirSync(PUBLIC_FOLDER, { recursive: true, withFileTypes: true })
@@ -105,24 +82,23 @@ export default defineConfig({
   // The page imports its own npm package from the sources.
   resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },
   base: "./",
-  plugins: [findLicences, writeServiceWorker, writeGallery],
+  plugins: [writeServiceWorker, writeGallery],
   build: {
     outDir: "../dist",
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
-    license: { fileName: LICENCES.page },
+    license: { fileName: LICENCES },
     modulePreload: { polyfill: false },
     rolldownOptions: {
       onwarn(warning) {
-        if (!NODE_MODULE_WARNING.test(warning.message)) throw new Error(warning.message);
+        throw new Error(warning.message);
       },
       checks: { pluginTimings: false },
     },
   },
   worker: {
     format: "es",
-    plugins: () => [licencesOfWorkers()],
     rolldownOptions: { checks: { pluginTimings: false } },
   },
   server: { host: "127.0.0.1" },

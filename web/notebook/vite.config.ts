@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { gzipSync } from "node:zlib";
 import { defineConfig, type Plugin } from "vite";
-import { findLicences, LICENCES, licencesOfWorkers, NODE_MODULE_WARNING } from "../vite.config";
+import { LICENCES } from "../vite.config";
 
 const here = import.meta.dirname;
 const source = join(here, "../package/src");
@@ -41,21 +41,14 @@ const compressed: Plugin = {
 
 export default defineConfig({
   root: here,
-  plugins: [findLicences, open, noAddresses(), compressed],
+  plugins: [open, noAddresses(), compressed],
   resolve: { alias: { "@cagework/core": source } },
-  // Without `process`, Draco's decoder does not look for its files in Node's folders.
-  define: { process: "undefined" },
-  worker: { format: "iife", plugins: () => [noAddresses(), licencesOfWorkers()] },
+  worker: { format: "iife", plugins: () => [noAddresses()] },
   build: {
     outDir: join(here, "../../crates/cagework-py/notebook/cagework_notebook/files"),
     emptyOutDir: true,
     target: "es2023",
-    license: { fileName: LICENCES.page },
+    license: { fileName: LICENCES },
     lib: { entry: join(here, "widget.ts"), formats: ["es"], fileName: () => "widget.js" },
-    rolldownOptions: {
-      onwarn: (warning, warn) => {
-        if (!NODE_MODULE_WARNING.test(warning.message)) warn(warning);
-      },
-    },
   },
 });

@@ -1,12 +1,10 @@
 // Builds the npm package into web/package/dist, from its sources and the output of `cargo xtask wasm`.
 //
 // Modules are not bundled. They refer to workers and wasm files in a form that browsers, Node and bundlers understand.
-// Only the decoders of compressed files are bundled, so that the package has no dependencies.
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join, relative } from "node:path";
-import { build } from "vite";
 
 const here = import.meta.dirname;
 const dist = join(here, "dist");
@@ -40,18 +38,3 @@ for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true }))
   }
   writeFileSync(path, whole(readFileSync(path, "utf8")));
 }
-
-await build({
-  configFile: false,
-  root: here,
-  logLevel: "error",
-  // Without `process`, Draco's decoder does not look for its files in Node's folders.
-  define: { process: "undefined" },
-  build: {
-    outDir: dist,
-    emptyOutDir: false,
-    target: "es2023",
-    license: { fileName: "licences-npm.json" },
-    lib: { entry: join(here, "src/decode.ts"), formats: ["es"], fileName: () => "decode.js" },
-  },
-});

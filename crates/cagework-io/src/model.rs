@@ -117,14 +117,6 @@ pub(crate) enum Document {
 }
 
 impl Model {
-    /// Stores the compressed file that this model was decoded from. An export of the undeformed model returns
-    /// these bytes.
-    pub fn set_packed(&mut self, file: Vec<u8>) {
-        if let Document::Gltf(document) = &mut self.document {
-            document.set_packed(file);
-        }
-    }
-
     /// Lists the names of the external files that the model refers to: buffers, images, material libraries. Libraries
     /// of an OBJ name textures in turn, so they are read by calling `resolve`. Empty if the file cannot be read.
     pub fn named_files(

@@ -150,7 +150,6 @@ impl Budget {
     }
 
     /// Bytes that further streams may unpack to. Headers of some formats do not declare all sizes.
-    #[cfg(feature = "decompress")]
     pub(crate) fn left(&self) -> u64 {
         let unpacked = self.expansion.limit(self.file).saturating_sub(self.unpacked);
         unpacked.min(self.limit.saturating_sub(self.held))

@@ -10,7 +10,7 @@ use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, ClosedFormError, ControlError};
 use cagework_editor::{BoundError, EditError};
 use cagework_gpu::GpuError;
-use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
+use cagework_io::{NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
 use cagework_job::JobError;
 use cagework_pose::pull::PullError;
 use serde::Serialize;
@@ -22,8 +22,6 @@ use wasm_bindgen::JsValue;
 pub(crate) enum ErrorName {
     /// The job was cancelled, or its result is out of date.
     Cancelled,
-    /// The geometry of a file is compressed. JavaScript decompresses the file and reads it again.
-    Compressed,
     /// A file cannot be read.
     Format,
     /// A bind needs more memory than its limit.
@@ -167,8 +165,7 @@ impl From<CageGenError> for Fault {
 
 impl From<ReadError> for Fault {
     fn from(error: ReadError) -> Self {
-        let is_compressed = matches!(&error, ReadError::Gltf { source: GltfError::Compressed { .. }, .. });
-        Self::new(if is_compressed { ErrorName::Compressed } else { ErrorName::Format }, error)
+        Self::new(ErrorName::Format, error)
     }
 }
 

@@ -152,12 +152,6 @@ impl LoadedModel {
         Self::restored(&mut StoredArrays(&mut next)).map_err(|error| Fault::new(ErrorName::Error, error))
     }
 
-    /// Keeps the compressed file that the model was decoded from, so that an undeformed model is exported in that form.
-    #[wasm_bindgen(js_name = setPacked)]
-    pub fn set_packed(&mut self, file: Vec<u8>) {
-        self.model.set_packed(file);
-    }
-
     /// Removes and returns the next remaining model of a project; undefined after the last one.
     #[wasm_bindgen(js_name = takeNext)]
     pub fn take_next(&mut self) -> Option<LoadedModel> {

@@ -17,8 +17,8 @@ const HEAD: &str = include_str!("licences.txt");
 const NOTICES: &str = "licences.txt";
 /// Name of the file with the licences of Rust's standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
-/// Files in the page's folder in which Vite lists the npm packages of the page and of its workers; see vite.config.ts.
-const NPM_LICENCES: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
+/// File in which Vite lists the npm packages of the page; see vite.config.ts. Workers bundle none.
+const NPM_LICENCES: &str = "licences-npm.json";
 /// Beginnings of the names of files that contain licences or required notices, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
@@ -33,25 +33,27 @@ struct Part {
     texts: Vec<String>,
 }
 
-/// Writes the notices of the page into `folder`, which contains the built page and Vite's lists.
+/// Writes the notices of the page into `folder`, which contains the built page and Vite's list.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
-    write(folder, of_web(folder, &NPM_LICENCES)?)
+    write(folder, [of_wasm()?, of_bundle(folder)?].concat())
 }
 
-/// Lists the packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`.
-/// Deletes the lists.
-fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
+/// Lists the packages compiled into the two wasm files.
+fn of_wasm() -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
     parts.extend(of_crates("cagework-web", target, &["--no-default-features", "--features", "webgl"])?);
-    for name in of_npm {
-        let said = folder.join(name);
-        parts.extend(of_npm_packages(&read(&said)?)?);
-        std::fs::remove_file(&said).map_err(|e| format!("cannot remove {}: {e}", said.display()))?;
-    }
+    Ok(parts)
+}
+
+/// Lists the npm packages in Vite's list in `folder`, and deletes the list.
+fn of_bundle(folder: &Path) -> Result<Vec<Part>, String> {
+    let list = folder.join(NPM_LICENCES);
+    let parts = of_npm_packages(&read(&list)?)?;
+    std::fs::remove_file(&list).map_err(|e| format!("cannot remove {}: {e}", list.display()))?;
     Ok(parts)
 }
 
@@ -71,22 +73,21 @@ pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-py", &host()?, &[])?)
 }
 
-/// Writes the notices of the npm package into `folder`, which belongs to the package. `dist` contains Vite's list of
-/// the npm packages that the decoder bundles.
+/// Writes the notices of the npm package into `folder`, which belongs to the package.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
-pub(crate) fn of_package(dist: &Path, folder: &Path) -> Result<(), String> {
-    write(folder, of_web(dist, &NPM_LICENCES[..1])?)
+pub(crate) fn of_package(folder: &Path) -> Result<(), String> {
+    write(folder, of_wasm()?)
 }
 
-/// Writes the notices of the notebook widget into `folder`. The folder `files` contains Vite's lists of the npm
+/// Writes the notices of the notebook widget into `folder`. The folder `files` contains Vite's list of the npm
 /// packages that the widget bundles.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_widget(files: &Path, folder: &Path) -> Result<(), String> {
-    write(folder, of_web(files, &NPM_LICENCES)?)
+    write(folder, [of_wasm()?, of_bundle(files)?].concat())
 }
 
 fn host() -> Result<String, String> {
@@ -153,8 +154,8 @@ fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
 
 /// Reads a list in which Vite names the packages that it has bundled.
 fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
-    let found: Vec<Value> = serde_json::from_str(json)
-        .map_err(|e| format!("{} cannot be read: {e}", NPM_LICENCES.join(" or ")))?;
+    let found: Vec<Value> =
+        serde_json::from_str(json).map_err(|e| format!("{NPM_LICENCES} cannot be read: {e}"))?;
     let word = |of: &Value, key: &str| of[key].as_str().unwrap_or_default().to_owned();
     let part = |of: &Value| Part {
         name: format!("{} v{}", word(of, "name"), word(of, "version")),

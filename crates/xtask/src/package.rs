@@ -52,7 +52,7 @@ pub(crate) fn pack() -> Result<String, String> {
     run("node", &["web/package/build.mjs"], &[])?;
     let notices = root().join(NOTICES);
     emptied(&notices)?;
-    licences::of_package(&root().join(PACKAGE).join("dist"), &notices)?;
+    licences::of_package(&notices)?;
     for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&root().join(ours), &notices.join(ours))?;
     }

@@ -14,8 +14,7 @@ use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::GltfError;
-#[cfg(not(feature = "decompress"))]
-use super::root::DRACO;
+use super::decompress::decompress;
 use super::root::{MESHOPT, typed, view_bytes};
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
@@ -63,8 +62,6 @@ pub(crate) fn load(
     let mut json = parsed(&json, bytes.len() as u64, memory_limit)?;
     check_version(&json)?;
     write_integers(&mut json, false);
-    #[cfg(not(feature = "decompress"))]
-    check_compression(name, &json, bin.as_deref(), (bytes.len() as u64, memory_limit))?;
     let (fallbacks, all) = (fallbacks(&json), (0..).zip(json["buffers"].as_array().into_iter().flatten()));
     let uris =
         all.filter(|(number, _)| !fallbacks.contains(number)).filter_map(|(_, buffer)| buffer.get("uri"));
@@ -73,17 +70,12 @@ pub(crate) fn load(
     let is_inline = !uris.is_empty() && uris.iter().all(|uri| uri.as_str().is_some_and(is_data));
     let packed = (is_inline && bytes.starts_with(b"glTF")).then(|| bytes.to_vec());
     let mut siblings = Siblings::new(resolve, memory_limit);
-    let buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
+    let mut buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
     let n_in_file = buffers.len();
-    #[cfg(feature = "decompress")]
-    let buffers = {
-        let mut buffers = buffers;
-        let in_buffers = distinct_bytes(&buffers);
-        let (file, held) = (in_buffers.max(bytes.len() as u64), of_json + bytes.len() as u64 + in_buffers);
-        let budget = Budget::new(file, held, memory_limit, Expansion::GEOMETRY);
-        super::decompress::decompress(name, &mut json, &mut buffers, budget)?;
-        buffers
-    };
+    let in_buffers = distinct_bytes(&buffers);
+    let (file, held) = (in_buffers.max(bytes.len() as u64), of_json + bytes.len() as u64 + in_buffers);
+    let budget = Budget::new(file, held, memory_limit, Expansion::GEOMETRY);
+    decompress(name, &mut json, &mut buffers, budget)?;
     let is_decoded = buffers.len() > n_in_file;
     drop_missing(&mut json, notices);
     let root = typed(&json)?;
@@ -282,34 +274,6 @@ fn check_version(json: &Value) -> Result<(), GltfError> {
         Some(v) => Err(GltfError::Json(format!("its version is {v:?}, but only 2.x is supported"))),
         None => Err(GltfError::Json("it has no asset version".into())),
     }
-}
-
-/// Reports compressed geometry, which the caller may decode if it fits the limits. `held`: memory in use, bytes.
-///
-/// # Errors
-/// [`GltfError::Compressed`] if there is compressed geometry, or the error of its price.
-#[cfg(not(feature = "decompress"))]
-fn check_compression(
-    name: &str,
-    json: &Value,
-    bin: Option<&[u8]>,
-    (held, memory_limit): (u64, u64),
-) -> Result<(), GltfError> {
-    let has = |object: &Value, extension: &str| object["extensions"].get(extension).is_some();
-    let items = |object: &Value, key: &str| object[key].as_array().cloned().unwrap_or_default();
-    for extension in [DRACO].into_iter().chain(MESHOPT) {
-        let required = items(json, "extensionsRequired").iter().any(|e| e == extension);
-        let in_views = items(json, "bufferViews").iter().any(|view| has(view, extension));
-        let in_meshes = json["meshes"].as_array().into_iter().flatten().any(|mesh| {
-            mesh["primitives"].as_array().into_iter().flatten().any(|primitive| has(primitive, extension))
-        });
-        if required || in_views || in_meshes {
-            let mut budget = Budget::new(held, held, memory_limit, Expansion::GEOMETRY);
-            budget.permit(super::declared::Declared::of(json, bin))?;
-            return Err(GltfError::compressed(name, extension, "no decoder is available".into()));
-        }
-    }
-    Ok(())
 }
 
 /// Replaces integers written as floats, such as 24.0, by integers. glTF 2.0 allows such floats (section 2.7).

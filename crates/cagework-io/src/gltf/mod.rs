@@ -11,9 +11,6 @@ mod animate;
 mod build;
 mod channels;
 mod container;
-#[cfg(any(test, not(feature = "decompress")))]
-mod declared;
-#[cfg(feature = "decompress")]
 mod decompress;
 mod export;
 mod geometry;
@@ -100,8 +97,7 @@ pub enum GltfError {
     /// The JSON is damaged or not glTF 2.0.
     #[error("not readable as glTF 2.0: {}", shown(.0))]
     Json(String),
-    /// Geometry is compressed and cannot be decoded. Without the feature `decompress`, this applies to all
-    /// compressed geometry.
+    /// Geometry is compressed and cannot be decoded.
     #[error(
         "its geometry is compressed ({extension}), and {}; convert it first: \
          npx @gltf-transform/cli copy {} {}",

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use ::gltf::binary::Glb;
 use glam::Vec3;
 use serde_json::{Value, json};
 
@@ -236,15 +235,6 @@ fn write_chunks(text: &[u8], length: usize, fill: impl FnOnce(&mut Vec<u8>)) -> 
 }
 
 impl GltfDocument {
-    /// Stores the compressed source file, if it is a self-contained GLB.
-    pub(crate) fn set_packed(&mut self, file: Vec<u8>) {
-        let json =
-            Glb::from_slice(&file).ok().and_then(|glb| serde_json::from_slice::<Value>(&glb.json).ok());
-        let buffers = json.as_ref().and_then(|json| json["buffers"].as_array());
-        let is_whole = buffers.is_some_and(|all| all.iter().all(|buffer| buffer.get("uri").is_none()));
-        self.packed = is_whole.then_some(file);
-    }
-
     /// The original file, byte for byte; `None` unless it was a self-contained GLB.
     pub(super) fn as_read(&self) -> Option<Result<Vec<u8>, WriteError>> {
         if let Some(packed) = &self.packed {

@@ -44,13 +44,18 @@ fn export_at_rest_is_the_original_shape() {
     assert!(relative_error(&model.positions, &again.positions) < ROUND_TRIP);
 }
 
-#[test]
-fn unmoved_glb_with_its_buffer_in_a_data_uri_is_written_as_read() {
+/// A cube whose buffer is a data URI.
+pub(crate) fn inline_glb() -> Vec<u8> {
     let mut json = plain_cube().json;
     let bin = plain_cube().bin;
     let hex: String = bin.iter().map(|byte| format!("%{byte:02x}")).collect();
     json["buffers"] = json!([{ "byteLength": bin.len(), "uri": format!("data:,{hex}") }]);
-    let file = common::glb(&json, None);
+    common::glb(&json, None)
+}
+
+#[test]
+fn unmoved_glb_with_its_buffer_in_a_data_uri_is_written_as_read() {
+    let file = inline_glb();
     let model = read("x.glb", &file).unwrap();
     assert!(model.write_glb(&model.positions).unwrap() == file);
     let moved = deformed(&model);

@@ -4,6 +4,8 @@ use cagework_io::{Look, Model, ModelFormat, Store, StoredArrays, UpAxis};
 use glam::Vec3;
 
 use crate::common::{PNG, instanced, plate, quantized, rigged, skinned, textured_square};
+use crate::compressed;
+use crate::glb_export::inline_glb;
 
 const OBJ: &str = "mtllib a.mtl\nmtllib b.mtl\no body\nv 0 0 0 1 0.5 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\ns 1\n\
     usemtl skin\nf 1/1/1 2/2/1 3/1/1\ng arm\nusemtl cloth\nf 1 3 4\n";
@@ -25,22 +27,22 @@ fn models() -> Vec<Model> {
     let far = "v 1e6 0 0\nv 1000001 0 0.25\nv 1e6 1 0\nf 1 2 3\n";
     let mut turned = read("turned.obj", far.as_bytes());
     turned.set_up(UpAxis::Z);
-    let mut packed = read("packed.glb", &textured_square().glb());
-    packed.set_packed(b"the compressed file".to_vec());
     let splat: Vec<u8> = [1.0_f32, 2.0, 3.0, 0.1, 0.1, 0.1].iter().flat_map(|x| x.to_le_bytes()).collect();
     let splat = [splat, vec![255, 128, 0, 200, 255, 128, 128, 128]].concat();
-    let files: [(&str, Vec<u8>); 9] = [
+    let files: [(&str, Vec<u8>); 11] = [
         ("textured.glb", textured_square().glb()),
         ("skinned.glb", skinned().glb()),
         ("rigged.glb", rigged().glb()),
         ("instanced.glb", instanced().glb()),
         ("quantized.glb", quantized().glb()),
+        ("compressed.glb", compressed::draco(&compressed::draco_stream()).glb()),
+        ("inline.glb", inline_glb()),
         ("a.obj", OBJ.into()),
         ("a.ply", PLY.into()),
         ("a.3mf", plate()),
         ("a.splat", splat),
     ];
-    files.iter().map(|(name, bytes)| read(name, bytes)).chain([turned, packed]).collect()
+    files.iter().map(|(name, bytes)| read(name, bytes)).chain([turned]).collect()
 }
 
 fn stored<T>(store: impl FnOnce(&mut Store), restore: impl FnOnce(&mut StoredArrays<'_>) -> T) -> (T, usize) {

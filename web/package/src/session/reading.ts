@@ -3,16 +3,15 @@
 import type { BuiltSample, CageArrays, CheckedCage, Reading } from "../contract";
 import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
-import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
+import { readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
-import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
 
 type ReadListener = (step: Reading) => void;
 
 const say = (tell: ReadListener, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
-/** Reads a model: decompresses it if needed, decodes textures, and checks the cage of a project. */
+/** Reads a model, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
   { files, up, used }: Jobs["read"]["input"],
@@ -119,21 +118,7 @@ export async function read(
 ): Promise<LoadedModel> {
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
-  const sibling = siblingOf(siblings);
-  const load = async (content: Blob) => {
-    const bytes = await toWasm(pkg, name, content, (share) => say(tell, "bytes", share));
-    say(tell, "geometry");
-    return pkg.LoadedModel.read(name, bytes, sibling);
-  };
-  try {
-    return await load(content);
-  } catch (error) {
-    if (!(error instanceof Error) || error.name !== "Compressed") throw error;
-    say(tell, "decompress");
-    const { decompress } = await loadPart(import("../decode"));
-    const file = await readBytes(name, content);
-    const loaded = await load(new Blob([(await decompress(name, file, sibling)) as BlobPart]));
-    loaded.setPacked(file);
-    return loaded;
-  }
+  const bytes = await toWasm(pkg, name, content, (share) => say(tell, "bytes", share));
+  say(tell, "geometry");
+  return pkg.LoadedModel.read(name, bytes, siblingOf(siblings));
 }

@@ -102,7 +102,6 @@ export const opening = {
   repairing: "Repairing the cage",
   stages: {
     bytes: "Reading the file",
-    decompress: "Decompressing",
     geometry: "Finding vertices and faces",
     textures: "Decoding textures",
     check: "Checking the cage",

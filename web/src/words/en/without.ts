@@ -2,7 +2,7 @@
 
 export const without = {
   different:
-    "The page draws with WebGL2 and computes on the processor instead. Everything works, but binding takes longer, and very large models follow with a delay.",
+    "The page draws with WebGL2 and computes on the processor instead. Everything works, but very fine grids take longer to bind, and very large models follow with a delay.",
   short: {
     NoWebGPU: "No WebGPU here",
     NoAdapter: "WebGPU found no graphics card",
