@@ -9,6 +9,7 @@
 //! then by ascending index of the nodes that show the mesh, then by triangle primitive of the mesh. If each
 //! mesh is shown once, this is document order.
 
+mod archive;
 mod blender;
 mod counts;
 mod error;
