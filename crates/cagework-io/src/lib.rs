@@ -25,7 +25,6 @@ mod order;
 mod origin;
 mod part_kind;
 mod ply;
-mod ply_text;
 mod point_file;
 mod polygons;
 mod pose_code;

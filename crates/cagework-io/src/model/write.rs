@@ -134,7 +134,7 @@ impl Model {
         }
         let to_write = SplatsToWrite { splats: &turned, origin, changed: changed.as_deref() };
         Ok(match (format, &capture.records) {
-            (ModelFormat::Ply, Records::Ply(table)) => splats::ply::write(&to_write, Some(table)),
+            (ModelFormat::Ply, Records::Ply) => splats::ply::write(&to_write, Some(&capture.file)),
             (ModelFormat::Ply, _) => splats::ply::write(&to_write, None),
             (ModelFormat::Splat, Records::Splat) => records::write(&to_write, Some(&capture.file)),
             (ModelFormat::Splat, _) => records::write(&to_write, None),
