@@ -1,4 +1,4 @@
-//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF, 3MF), Gaussian splats (3DGS PLY, .splat, SPZ, GLB), weights (NPZ)
+//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF, 3MF), Gaussian splats (3DGS and compressed PLY, .splat, SPZ, GLB, SOG), weights (NPZ)
 //! and projects, as bytes.
 //!
 //! The crate uses no file system and no clock, so it compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the

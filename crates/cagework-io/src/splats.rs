@@ -4,6 +4,7 @@
 mod packed;
 pub(crate) mod ply;
 pub(crate) mod records;
+pub(crate) mod sog;
 pub(crate) mod spz;
 
 use cagework_core::splats::Splats;

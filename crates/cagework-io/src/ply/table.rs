@@ -215,7 +215,9 @@ impl Header {
         for number in 1.. {
             let rest = &bytes[end..MAX_HEADER.min(bytes.len()).max(end)];
             let Some(length) = rest.iter().position(|&b| b == line_end) else {
-                return Err(PlyError::Syntax("its header has no 'end_header' line".into()));
+                return Err(PlyError::Syntax(
+                    "its header has no 'end_header' line in its first 1 MiB".into(),
+                ));
             };
             let line = String::from_utf8_lossy(&rest[..length]);
             end += length + 1;

@@ -591,7 +591,6 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     legacy.extend(&extensions);
     assert_eq!(read("a.spz", &gzip(&legacy)).unwrap().notices, turned.notices);
 
-    assert!(fault("a.sog", b"PK\x03\x04").contains("convert it with `splat-transform IN.sog OUT.ply`"));
     let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
     // A GLB stores opacities as 32-bit floats, without a logarithm.
     let mut beyond = glb.clone();
