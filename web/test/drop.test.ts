@@ -78,7 +78,8 @@ describe("dropped files", () => {
   it("list the formats if no file can be opened", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, .spz, and .sog files.",
+      sentence:
+        "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, .spz, and .sog files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });
