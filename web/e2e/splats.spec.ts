@@ -1,5 +1,6 @@
 /** A capture of Gaussian splats is pulled, exported, posed, saved and opened again. */
 
+import { readFileSync } from "node:fs";
 import { savedSince } from "./kept";
 import { splats } from "./models";
 import { difference, drawsNothing, pullsACapture, squares } from "./stories";
@@ -20,6 +21,17 @@ test("a capture is pulled, exported and opened again", async ({ page }) => {
     difference(pulled, await squares(page)),
     "the picture of the export equals that of the pose",
   ).toBeLessThan(4);
+});
+
+test("a SOG opens and is exported as a PLY", async ({ page }) => {
+  const sog = new URL("../../crates/cagework-io/tests/splats/helix.sog", import.meta.url);
+  await openWith(page, [{ name: "helix.sog", bytes: readFileSync(sog) }]);
+  await expect(page).toHaveTitle(/helix/);
+  await bound(page);
+  await page.getByRole("button", { name: "Export" }).first().click();
+  const file = await download(page, "shape");
+  expect(file.name).toMatch(/\.ply$/);
+  expect(Buffer.from(file.bytes).includes("element vertex 240")).toBe(true);
 });
 
 test("poses of a capture are blended and kept by a project and a reload, and its floaters are hidden", async ({

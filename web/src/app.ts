@@ -20,9 +20,10 @@ import { createView } from "./actions/view";
 import { createWalk } from "./actions/walk";
 import { createWorks } from "./actions/works";
 import type { NamedFile } from "./contract";
-import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
+import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_NAMES, MODEL_TYPES, SLIDERS } from "./defaults";
 import { followDocument } from "./document";
 import { commitDraft } from "./draft";
+import { extension } from "./drop";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
@@ -35,7 +36,8 @@ const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
 /** Files of clips must contain their buffers: the file dialog gives no access to files beside them. */
 const CLIPS = ".glb,.gltf";
 const CLIPS_OF_RIGS = ".glb,.gltf,.vrm,.bin";
-const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
+const BESIDE = [...COMPANION_ENDINGS, ...MODEL_NAMES.map(extension)].map((ending) => `.${ending}`);
+const MODELS = `${CAGES},${BESIDE},${MODEL_TYPES}`;
 
 /** Media query for windows in which the See panel covers the panel of the step; stage.css has the same query. */
 const NARROW_WINDOW = "(max-width: 1279.98px)";

@@ -35,6 +35,12 @@ describe("dropped files", () => {
     expect(plan.sentence).toBe("Opens scene.gltf with its 2 files and makes a cage for it.");
   });
 
+  it("find the meta.json of a capture among its images", () => {
+    const plan = planDrop(["plant/means_l.webp", "plant/meta.json", "plant/sh0.webp"]);
+    expect(plan).toMatchObject({ kind: "model", main: 1 });
+    expect(planDrop(["plant/means_l.webp", "plant/joints.json"]).kind).toBe("unknown");
+  });
+
   it("let several models share a cage, generated or given", () => {
     expect(planDrop(["body.glb", "skin.png", "shirt.obj", "a/buckle.glb"])).toEqual({
       kind: "model",
@@ -72,7 +78,8 @@ describe("dropped files", () => {
   it("list the formats if no file can be opened", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, and .spz files.",
+      sentence:
+        "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, .spz, and .sog files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

@@ -289,9 +289,14 @@ impl FromStr for ModelOutput {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let format = ModelFormat::of_export(text)
-            .ok_or_else(|| wrong_ending(&ModelFormat::ALL.map(ModelFormat::export_extension)))?;
-        Ok(Self { path: text.into(), format })
+        if let Some(format) = ModelFormat::of_export(text) {
+            return Ok(Self { path: text.into(), format });
+        }
+        let written = ModelFormat::ALL.into_iter().filter(|format| format.is_written());
+        let endings: Vec<&str> = written.map(ModelFormat::export_extension).collect();
+        let is_read = ModelFormat::of_name(text).is_some_and(|format| !format.is_written());
+        let reason = if is_read { "this format is read, but not written: " } else { "" };
+        Err(format!("{reason}{}", wrong_ending(&endings)))
     }
 }
 

@@ -45,6 +45,14 @@ pub enum WriteError {
         /// Largest value that the format can store.
         limit: &'static str,
     },
+    /// The format is read, but not written.
+    #[error("a {} is read, but not written: export {others}", format.to_uppercase())]
+    ReadOnly {
+        /// Extension of the requested format, lower case, without the dot.
+        format: &'static str,
+        /// Formats that can be exported instead, as text: "GLB, PLY, SPLAT or SPZ".
+        others: String,
+    },
     /// The format stores splats, but the model has none.
     #[error("the model has no splats, but a {} stores nothing else: export {}", format.to_uppercase(), others)]
     NoSplats {

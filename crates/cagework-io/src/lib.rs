@@ -1,4 +1,4 @@
-//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF, 3MF), Gaussian splats (3DGS PLY, .splat, SPZ, GLB), weights (NPZ)
+//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF, 3MF), Gaussian splats (3DGS and compressed PLY, .splat, SPZ, GLB, SOG), weights (NPZ)
 //! and projects, as bytes.
 //!
 //! The crate uses no file system and no clock, so it compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the
@@ -9,6 +9,7 @@
 //! then by ascending index of the nodes that show the mesh, then by triangle primitive of the mesh. If each
 //! mesh is shown once, this is document order.
 
+mod archive;
 mod blender;
 mod counts;
 mod error;
@@ -24,7 +25,6 @@ mod order;
 mod origin;
 mod part_kind;
 mod ply;
-mod ply_text;
 mod point_file;
 mod polygons;
 mod pose_code;

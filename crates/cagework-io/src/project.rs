@@ -234,6 +234,7 @@ fn file_of(model: &Model) -> Result<Cow<'_, [u8]>, WriteError> {
         (Document::Polygons(document), ModelFormat::Obj | ModelFormat::ThreeMf) => {
             Ok(document.bytes.as_slice().into())
         }
+        (_, ModelFormat::Sog) => Ok(model.capture.as_ref().map_or(&[][..], |capture| &capture.file).into()),
         // Documents of PLY, STL and OFF do not keep the bytes of their file: write it again.
         (_, format) => Ok(model.write(format, &model.positions)?.into()),
     }

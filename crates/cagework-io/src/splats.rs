@@ -1,8 +1,10 @@
 //! Captures: files of Gaussian splats. A capture keeps its file, and an export in the same format changes only the
 //! splats that moved. Each format has a submodule, except glTF, which is in `gltf/splats.rs`.
 
+mod packed;
 pub(crate) mod ply;
 pub(crate) mod records;
+pub(crate) mod sog;
 pub(crate) mod spz;
 
 use cagework_core::splats::Splats;
@@ -57,7 +59,7 @@ pub enum SplatError {
     #[error(
         "its splats have no '{0}': a 3DGS file has x, y, z, f_dc_0 to f_dc_2, opacity, scale_0 to scale_2 and rot_0 to rot_3"
     )]
-    Missing(&'static str),
+    Missing(String),
     /// A number of a splat is invalid.
     #[error("splat {splat} has {what} {value}, but {limit}: {FILTER}")]
     Value {
@@ -92,7 +94,8 @@ pub(crate) struct Capture {
 /// Parts of the capture's file that an export in the same format reuses.
 #[derive(Clone, Debug)]
 pub(crate) enum Records {
-    Ply(ply::Table),
+    /// A 3DGS PLY.
+    Ply,
     Splat,
     Spz(spz::Body),
     /// Colour space of a glTF, whose exports are new files.
@@ -303,6 +306,17 @@ pub(crate) fn log_odds(opacity: f32) -> f32 {
 
 pub(crate) fn log_scale(scale: Vec3) -> Vec3 {
     scale.clamp(Vec3::splat(MIN_SCALE), Vec3::splat(MAX_LOG_SCALE)).map(f32::ln)
+}
+
+/// Composes a rotation from the index of its largest component among w, x, y and z, and the three others in this order.
+pub(crate) fn rotation_of(largest: usize, others: [f64; 3]) -> Quat {
+    let mut parts = [0.0; 4];
+    for (k, x) in (0..4).filter(|&k| k != largest).zip(others) {
+        parts[k] = x;
+    }
+    parts[largest] = (1.0 - others.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
+    let [w, x, y, z] = parts.map(|x| x as f32);
+    Quat::from_xyzw(x, y, z, w)
 }
 
 /// A number from 0 to 1 as a byte.

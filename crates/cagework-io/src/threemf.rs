@@ -15,6 +15,7 @@ mod xml;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
+use crate::archive::write_new;
 use crate::error::WriteError;
 use crate::obj::{Group, MAX_MATERIALS, Material, NONE};
 use crate::origin::Coordinate;
@@ -162,7 +163,7 @@ pub(crate) fn write(shape: &Shape<'_>) -> Result<Vec<u8>, WriteError> {
         return Err(WriteError::NoFaces { format: "3MF" });
     }
     text += "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
-    package::write_new(&[
+    write_new(&[
         ("[Content_Types].xml", CONTENT_TYPES),
         ("_rels/.rels", RELATIONSHIPS),
         ("3D/3dmodel.model", &text),

@@ -156,8 +156,11 @@ impl Request {
             self.options.reshape.skeleton = Some(Arc::new(skeleton));
         }
         let model = read(&self.model, self.skeleton.is_some())?;
-        let format =
-            if matches!(self.poses, Poses::Targets { .. }) { ModelFormat::Gltf } else { model.format() };
+        let format = if matches!(self.poses, Poses::Targets { .. }) {
+            ModelFormat::Gltf
+        } else {
+            model.format().of_exports()
+        };
         let job = Job::new(model, format, &self.options).map_err(error::job)?;
         let deformed = job.deform(&bind_job(&job, &self.poses)?, &self.poses).map_err(error::job)?;
         Ok((job.write(deformed).map_err(error::job)?.bytes, job.part_notices().to_vec()))

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use crate::field::Field;
 use crate::{arrays, error, files, work};
 
-/// Gaussian splats of a file (3DGS .ply, .splat, .spz, .glb).
+/// Gaussian splats of a file (3DGS or compressed .ply, .splat, .spz, .sog, .glb).
 ///
 /// Splats(path)
 ///

@@ -119,6 +119,11 @@ fn generated_types_are_up_to_date() {
     let shapes = ModelFormat::ALL.into_iter().filter(|format| format.holds_faces() && !format.holds_poses());
     for (about, name, values) in [
         ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(|facts| facts.endings)),
+        (
+            "Names of model files whose extension is not that of a model.",
+            "MODEL_NAMES",
+            all(|facts| facts.names),
+        ),
         ("MIME types of models.", "MODEL_TYPES", all(|facts| facts.mime_types)),
         ("Extensions of models that refer to other files.", "NAMING_ENDINGS", all(|facts| facts.naming)),
         ("Extensions of these other files.", "COMPANION_ENDINGS", all(|facts| facts.companions)),

@@ -77,7 +77,7 @@ impl Binder {
     ) -> Answer<Vec<u8>> {
         let RigOptions { reshape, plain: shape_only, .. } = decode(rig)?;
         let options = JobOptions { reshape, shape_only, ..JobOptions::default() };
-        let job = Job::new(&loaded.model, loaded.model.format(), &options)?;
+        let job = Job::new(&loaded.model, loaded.model.format().of_exports(), &options)?;
         let set = control_set(cage)?;
         let poses = Poses::Shape(pose(&posed, Controls::from(&set).n_controls())?);
         let mut request: PageBindOptions = decode(bind_options)?;

@@ -1,6 +1,6 @@
 /** File types, by extension. */
 
-import { MODEL_ENDINGS } from "./contract/generated";
+import { MODEL_ENDINGS, MODEL_NAMES } from "./contract/generated";
 
 /** Returns the lower-case extension of a file name without the dot; "" if the name has none. */
 export function extension(name: string): string {
@@ -14,6 +14,8 @@ export function extension(name: string): string {
  * not a model.
  */
 export function rankOf(name: string): number {
+  const base = name.split("/").at(-1)?.toLowerCase() ?? "";
+  if ((MODEL_NAMES as readonly string[]).includes(base)) return MODEL_ENDINGS.length;
   return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));
 }
 

@@ -41,6 +41,13 @@ fn help_lists_the_formats_that_a_command_takes() {
     }
 }
 
+#[test]
+fn a_format_that_is_only_read_is_refused_as_an_output() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let message = "this format is read, but not written: the name must end in .glb or .obj or .ply";
+    sandbox.run("deform mesh.obj --cage cage.obj --pose cage.obj -o x.sog").code(2).stderr(contains(message));
+}
+
 /// The message names the option of the command, not that of the library.
 #[test]
 fn number_out_of_range_is_refused_with_the_range() {

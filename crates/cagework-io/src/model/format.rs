@@ -9,7 +9,7 @@ use crate::error::WriteError;
 use crate::polygons::Shape;
 use crate::shown::{shown, without_byte_order_mark};
 use crate::siblings::Resolve;
-use crate::splats::{records, spz};
+use crate::splats::{records, sog, spz};
 use crate::up::UpAxis;
 use crate::{gltf, obj, off, ply, stl, threemf};
 
@@ -20,6 +20,8 @@ pub struct FormatFacts {
     pub endings: &'static [&'static str],
     /// Extensions among `endings` that are supported for reading only.
     read_only: &'static [&'static str],
+    /// Names of readable files whose extension is not that of a model, lower case.
+    pub names: &'static [&'static str],
     /// MIME types, for file choosers that support MIME types better than extensions. The first one is used for exported
     /// files.
     pub mime_types: &'static [&'static str],
@@ -75,6 +77,7 @@ pub(crate) enum ModelProperty {
 const DEFAULT_FACTS: FormatFacts = FormatFacts {
     endings: &[],
     read_only: &[],
+    names: &[],
     mime_types: &[],
     naming: &[],
     companions: &[],
@@ -123,6 +126,7 @@ formats! {
     Gltf = "gltf": FormatFacts {
         endings: &["glb", "vrm", "gltf"],
         read_only: &["gltf"],
+        names: &[],
         mime_types: &["model/gltf-binary", "model/gltf+json"],
         naming: &["gltf"],
         companions: &["bin", "png", "jpg", "jpeg", "webp", "ktx2"],
@@ -240,6 +244,18 @@ formats! {
         keeps: &[ModelProperty::Splats, ModelProperty::Harmonics],
         ..DEFAULT_FACTS
     };
+    /// SOG: PlayCanvas' compressed format for Gaussian splats. It is read, but not written.
+    Sog = "sog": FormatFacts {
+        endings: &["sog"],
+        read_only: &["sog"],
+        names: &["meta.json"],
+        naming: &["json"],
+        is: sog::is_sog,
+        marked: &[["sog", "not a SOG", "it is not a zip archive with a meta.json"]],
+        read: |source| source.sog(),
+        named_files: |bytes, _, _| sog::named_files(bytes),
+        ..DEFAULT_FACTS
+    };
 }
 
 /// A file is not in a supported format.
@@ -261,6 +277,19 @@ impl ModelFormat {
         self.facts().endings[0]
     }
 
+    /// Whether files of this format are written, not only read.
+    #[must_use]
+    pub fn is_written(self) -> bool {
+        !self.facts().read_only.contains(&self.export_extension())
+    }
+
+    /// Format of the exports of a model of this format, unless the user chooses another one: PLY for a SOG, which is not
+    /// written.
+    #[must_use]
+    pub fn of_exports(self) -> Self {
+        if self.is_written() { self } else { Self::Ply }
+    }
+
     /// Whether a file of this format can store several poses of a model.
     #[must_use]
     pub fn holds_poses(self) -> bool {
@@ -271,7 +300,7 @@ impl ModelFormat {
     #[must_use]
     pub fn usual_up(self) -> UpAxis {
         match self {
-            Self::Ply | Self::Splat => UpAxis::YDown,
+            Self::Ply | Self::Splat | Self::Sog => UpAxis::YDown,
             Self::ThreeMf => UpAxis::Z,
             _ => UpAxis::Y,
         }
@@ -310,7 +339,14 @@ impl ModelFormat {
     /// Whether a file name has the extension of a readable model and is not hidden.
     #[must_use]
     pub fn is_name_of_model(name: &str) -> bool {
-        !name.starts_with('.') && Self::of_ending(&extension(name)).is_some()
+        let is_named = |format: &Self| format.facts().names.iter().any(|of| of.eq_ignore_ascii_case(name));
+        !name.starts_with('.') && (Self::of_name(name).is_some() || Self::ALL.iter().any(is_named))
+    }
+
+    /// Finds the format of a file name by its extension, also one that is only read.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::of_ending(&extension(name))
     }
 
     fn of_ending(extension: &str) -> Option<Self> {
@@ -327,7 +363,7 @@ impl ModelFormat {
         let export = format!("export it as {}", Self::listed(ModelProperty::Faces));
         let text = without_byte_order_mark(bytes).trim_ascii_start();
         let ending = extension(name);
-        if ["sog", "ksplat", "lcc"].contains(&ending.as_str()) {
+        if ["ksplat", "lcc"].contains(&ending.as_str()) {
             let hint = format!("convert it with `splat-transform IN.{ending} OUT.ply`");
             return fault("a compressed capture of Gaussian splats", &hint);
         }
@@ -343,7 +379,9 @@ impl ModelFormat {
             [b'P', b'K', 3, 4, ..] if ending == "npz" => {
                 return fault("weights or arrays, not a model", &export);
             }
-            [b'P', b'K', 3, 4, ..] if ending != "3mf" => return fault("a zip archive", "unpack it first"),
+            [b'P', b'K', 3, 4, ..] if !["3mf", "sog"].contains(&ending.as_str()) => {
+                return fault("a zip archive", "unpack it first");
+            }
             [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", &export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", &export),
             [0xff, 0xfe, ..]

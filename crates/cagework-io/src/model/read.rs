@@ -130,6 +130,14 @@ impl Source<'_, '_> {
         Ok(self.capture(format, read))
     }
 
+    /// Reads a SOG: an archive, or a `meta.json` with its images beside it.
+    pub(super) fn sog(mut self) -> Result<Model, ReadError> {
+        let bytes = std::mem::take(&mut self.bytes);
+        let archive = splats::sog::archive_of(bytes, self.resolve, self.memory_limit);
+        self.bytes = archive.map_err(|e| self.splat_fault(e))?;
+        self.splats(ModelFormat::Sog, splats::sog::read)
+    }
+
     fn splat_fault(&self, source: SplatError) -> ReadError {
         ReadError::Splats { name: self.name.into(), source }
     }

@@ -36,10 +36,19 @@ impl Model {
                 self.write_splats(format, &Splats { positions: positions.to_vec(), ..capture.splats.clone() })
             }
             _ if format.holds_faces() => (format.facts().write)(self, positions),
-            _ => {
-                let others = ModelFormat::listed(ModelProperty::Faces);
-                Err(WriteError::NoSplats { format: format.export_extension(), others })
-            }
+            _ => Err(Self::not_written(format)),
+        }
+    }
+
+    /// Error for a format that is only read, or that stores only splats, which the model lacks.
+    fn not_written(format: ModelFormat) -> WriteError {
+        let (is_written, format) = (format.is_written(), format.export_extension());
+        let others = if is_written { ModelProperty::Faces } else { ModelProperty::Splats };
+        let others = ModelFormat::listed(others);
+        if is_written {
+            WriteError::NoSplats { format, others }
+        } else {
+            WriteError::ReadOnly { format, others }
         }
     }
 
@@ -67,10 +76,7 @@ impl Model {
     /// # Errors
     /// [`WriteError::NoSplats`] if the model is not a capture.
     pub fn with_splats(&self, splats: Splats) -> Result<Self, WriteError> {
-        let Some(capture) = &self.capture else {
-            let others = ModelFormat::listed(ModelProperty::Faces);
-            return Err(WriteError::NoSplats { format: self.format.export_extension(), others });
-        };
+        let Some(capture) = &self.capture else { return Err(Self::not_written(self.format)) };
         let records = match &capture.records {
             Records::Gltf(color_space) => Records::Gltf(color_space.clone()),
             _ => Records::New,
@@ -90,8 +96,7 @@ impl Model {
     /// number is not finite.
     pub fn write_splats(&self, format: ModelFormat, splats: &Splats) -> Result<Vec<u8>, WriteError> {
         let Some(capture) = self.capture.as_ref().filter(|_| format.holds_splats()) else {
-            let others = ModelFormat::listed(ModelProperty::Faces);
-            return Err(WriteError::NoSplats { format: format.export_extension(), others });
+            return Err(Self::not_written(format));
         };
         self.check(&splats.positions)?;
         let n_harmonics = splats.harmonics.len() / splats.len().max(1);
@@ -134,7 +139,7 @@ impl Model {
         }
         let to_write = SplatsToWrite { splats: &turned, origin, changed: changed.as_deref() };
         Ok(match (format, &capture.records) {
-            (ModelFormat::Ply, Records::Ply(table)) => splats::ply::write(&to_write, Some(table)),
+            (ModelFormat::Ply, Records::Ply) => splats::ply::write(&to_write, Some(&capture.file)),
             (ModelFormat::Ply, _) => splats::ply::write(&to_write, None),
             (ModelFormat::Splat, Records::Splat) => records::write(&to_write, Some(&capture.file)),
             (ModelFormat::Splat, _) => records::write(&to_write, None),

@@ -88,7 +88,7 @@ pub(crate) fn patch(bytes: &[u8], rest: &[Vec3], shape: &Shape<'_>) -> Result<Ve
     let mut package = Package::open(bytes, u64::MAX).map_err(fault)?;
     let mut texts = HashMap::new();
     for (k, (name, part)) in scene.parts.iter().enumerate() {
-        let Some(index) = package.index(name) else { continue };
+        let Some(index) = package.archive.index(name) else { continue };
         let text = package.text(name, index).map_err(fault)?;
         let mut n_bytes = text.len() as u64;
         let mut edits = if k == 0 { std::mem::take(&mut items) } else { Vec::new() };
@@ -116,7 +116,7 @@ pub(crate) fn patch(bytes: &[u8], rest: &[Vec3], shape: &Shape<'_>) -> Result<Ve
             texts.insert(index, new);
         }
     }
-    package.with_texts(&texts)
+    package.archive.with_texts(&texts)
 }
 
 impl Variants<'_> {

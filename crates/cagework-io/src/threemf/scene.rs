@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use glam::DAffine3;
 
-use super::package::{Package, fault, part_name};
+use super::package::{Package, fault};
 use super::part::{MAX_OBJECTS, ModelPart, Object, PartCounts, Placement};
+use crate::archive::part_name;
 use crate::gltf::{MAX_ELEMENTS, MAX_TRIANGLES};
 use crate::order::{Order, Permit, Price};
 use crate::polygons::{Polygons, PolygonsError};
@@ -137,7 +138,7 @@ impl Scene {
         name: &str,
         counts: &mut PartCounts,
     ) -> Result<(), PolygonsError> {
-        let index = package.index(name).ok_or_else(|| fault(name, "is missing"))?;
+        let index = package.archive.index(name).ok_or_else(|| fault(name, "is missing"))?;
         let part = ModelPart::read(name, &package.text(name, index)?, counts)?;
         if let Some((root, first)) = self.parts.first()
             && first.unit != part.unit

@@ -15,6 +15,7 @@ mod look;
 mod npz;
 mod obj;
 mod off;
+mod packed_splats;
 mod polygons;
 mod project;
 mod rigs;

@@ -1,11 +1,11 @@
 //! Numbered fuzz inputs: files of every readable kind, with random damage.
 
-use std::io::{Read as _, Write as _};
+use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
 use cagework_core::{Frames, PolygonMesh, Weights, subdivided_box};
-use cagework_io::{ModelFormat, encode_pose, write_cage_obj, write_project, write_weights_npz};
+use cagework_io::{ModelFormat, encode_pose, write_cage_obj, write_project, write_weights_npz, write_zip};
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
@@ -15,11 +15,15 @@ use proptest::sample::{Index, select};
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
+use zip::ZipArchive;
 
 use crate::common::{
     Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, package, plain_cube, plate, plate_parts, quantized,
     read, rigged, skinned, textured_square, twist,
 };
+
+/// A SOG of 240 splats with spherical harmonics of degree 1.
+const SOG: &[u8] = include_bytes!("../splats/helix.sog");
 
 /// Number of GLB samples, which precede all other samples.
 const N_GLB: usize = 7;
@@ -106,6 +110,8 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     // SPZ 4 with compressed blocks, and with uncompressed blocks, in which damaged bytes change the decoded values.
     samples.push(include_bytes!("../splats/helix-4.spz").to_vec());
     samples.push(include_bytes!("../splats/six-4.spz").to_vec());
+    samples.push(include_bytes!("../splats/helix.compressed.ply").to_vec());
+    samples.push(SOG.to_vec());
     samples
 }
 
@@ -189,6 +195,8 @@ fn files() -> BoxedStrategy<Vec<u8>> {
         1 => prop::collection::vec(damage(), 1..6).prop_map(move |damage| gzip_damaged(&gzipped, &damage)),
         2 => (prop::collection::vec((any::<Index>(), odd_attribute()), 1..5), prop::collection::vec(damage(), 0..2))
             .prop_map(|(changes, damage)| odd_package(&changes, &damage)),
+        2 => (any::<Index>(), prop::collection::vec(damage(), 1..4), prop::collection::vec((any::<Index>(), odd_value()), 1..3))
+            .prop_map(|(file, damage, changes)| odd_sog(file, &damage, changes)),
         2 => soup(),
     ]
     .boxed()
@@ -356,18 +364,50 @@ fn odd_value() -> impl Strategy<Value = Value> {
     ]
 }
 
+/// Replaces values of a document.
+fn change(json: &mut Value, changes: Vec<(Index, Value)>) {
+    for (at, value) in changes {
+        let mut paths = Vec::new();
+        places(json, "", &mut paths);
+        let Some(place) = paths.get(at.index(paths.len().max(1))) else { break };
+        *json.pointer_mut(place).expect("the pointer is valid") = value;
+    }
+}
+
+/// The SOG with a damaged image, or with mutated values of its document.
+fn odd_sog(file: Index, damage: &[Damage], changes: Vec<(Index, Value)>) -> Vec<u8> {
+    let mut archive = ZipArchive::new(Cursor::new(SOG)).expect("the sample is valid");
+    let mut files = Vec::new();
+    for k in 0..archive.len() {
+        let (mut entry, mut bytes) = (archive.by_index(k).expect("the sample is valid"), Vec::new());
+        entry.read_to_end(&mut bytes).expect("the sample is valid");
+        files.push((entry.name().to_owned(), bytes));
+    }
+    let n = files.len();
+    let (name, bytes) = &mut files[file.index(n)];
+    if name == "meta.json" {
+        let mut json: Value = serde_json::from_slice(bytes).expect("the sample is valid");
+        // Without the codebooks, which have most of the values.
+        let codebooks = ["scales", "sh0", "shN"].map(|name| json[name]["codebook"].take());
+        change(&mut json, changes);
+        for (name, codebook) in ["scales", "sh0", "shN"].into_iter().zip(codebooks) {
+            let part = json.get_mut(name).and_then(Value::as_object_mut);
+            part.map(|part| part.entry("codebook").and_modify(|of| *of = codebook));
+        }
+        *bytes = json.to_string().into_bytes();
+    } else {
+        *bytes = damaged(std::mem::take(bytes), damage);
+    }
+    write_zip(&files).expect("the names differ")
+}
+
 /// A GLB with mutated JSON values; with `as_text`, a glTF with an external buffer.
 fn odd_json(sample: &[u8], changes: Vec<(Index, Value)>, as_text: bool) -> Vec<u8> {
     let mut json = json_of(sample);
     if as_text {
         json["buffers"][0]["uri"] = sample_name(sample).into();
     }
-    for (at, value) in changes {
-        let mut paths = Vec::new();
-        places(&json, "", &mut paths);
-        let Some(place) = paths.get(at.index(paths.len().max(1))) else { break };
-        *json.pointer_mut(place).expect("the pointer is valid") = value;
-    }
+    change(&mut json, changes);
     if as_text { json.to_string().into_bytes() } else { glb(&json, Some(bin_of(sample))) }
 }
 
