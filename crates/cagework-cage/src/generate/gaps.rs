@@ -7,7 +7,7 @@ use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::mirrors::Mirrors;
 use super::soup::Soup;
 use super::voxels::Voxels;
-use super::{CageOptions, MAX_TARGET, MAX_VOXELS, VERTICES_PER_GAP};
+use super::{CageOptions, MAX_OPEN_SHARE, MAX_TARGET, MAX_VOXELS, VERTICES_PER_GAP};
 use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancellation;
@@ -28,9 +28,11 @@ const MIN_OPEN_WIDTH: f64 = 4.0;
 /// Smallest area of a gap for which the lattice is refined, as a fraction of the squared longest side of the model.
 pub(super) const MIN_GAP_AREA: f64 = 0.003;
 
-/// Smallest area of a gap that is reported, and for which the lattice is refined if the cage has enough vertices for all
-/// gaps of that area.
+/// Smallest area of a gap for which the lattice is refined if the cage has enough vertices for all gaps of that area.
 const MIN_SMALL_GAP_AREA: f64 = 0.0015;
+
+/// Smallest area of a gap that is reported. Fingers of a standing figure have gaps of 0.0006.
+const MIN_REPORTED_GAP_AREA: f64 = 0.0005;
 
 /// Aspect ratios of a voxel: length divided by thickness across narrow gaps. The second is used if the first would need
 /// a resolution above [`MAX_RESOLUTION`].
@@ -95,6 +97,8 @@ pub(super) struct ModelGap {
     across: DVec3,
     /// Smallest number of cubic voxels along the model's longest side with which the gap stays open.
     least_voxels: f64,
+    /// Smallest target for which the lattice is refined for the gap; `usize::MAX` for gaps that are only reported.
+    least_target: usize,
 }
 
 /// Narrow gaps of a model, and a lattice that resolves them.
@@ -115,8 +119,8 @@ pub(super) struct NarrowGaps {
 }
 
 /// Finds the gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a lattice
-/// that leaves the largest `most` of them open: all gaps if there are at most a third of `most`, otherwise only the large ones. With
-/// more than `most` large gaps, the lattice has `base` cubic voxels instead. Gaps narrower than twice the `clearance` of
+/// that leaves open those for which a cage of `target` vertices has enough of them: the small ones too, only the large ones, or
+/// none, with a lattice of `base` cubic voxels. Gaps narrower than twice the `clearance` of
 /// the cage from the model (object units) are left out, because they close on any lattice.
 ///
 /// # Errors
@@ -125,7 +129,7 @@ pub(super) fn narrow_gaps(
     soup: &Soup<'_>,
     bounds: [DVec3; 2],
     clearance: f64,
-    [base, most]: [usize; 2],
+    [base, target]: [usize; 2],
     go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<NarrowGaps, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
@@ -137,7 +141,7 @@ pub(super) fn narrow_gaps(
     let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| {
-        gap.area >= MIN_SMALL_GAP_AREA * n * n
+        gap.area >= MIN_REPORTED_GAP_AREA * n * n
             && gap.width * lattice.cell > 2.0 * clearance
             && !gap.is_hollow(&lattice, soup)
     });
@@ -152,12 +156,19 @@ pub(super) fn narrow_gaps(
         width: gap.width * lattice.cell,
         across: gap.across,
         least_voxels: MIN_OPEN_WIDTH * n / gap.width,
+        least_target: usize::MAX,
     };
-    let found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
-    let n_large = found.iter().filter(|gap| gap.area >= MIN_GAP_AREA).count();
-    // Handles need vertices, too: those of hair cards (hundreds) are too many. For small gaps, the lattice is refined only if vertices abound.
-    let fits = |&(n, room): &(usize, usize)| n <= room && handles <= 2 * most;
-    let kept = [(found.len(), most / 3), (n_large, most)].into_iter().find(fits);
+    let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
+    let n_above = |area: f64| found.iter().filter(|gap| gap.area >= area).count();
+    let (n_large, n_small) = (n_above(MIN_GAP_AREA), n_above(MIN_SMALL_GAP_AREA));
+    // Handles need vertices, too: those of hair cards (hundreds) are too many. For small gaps, the lattice is refined only if
+    // vertices abound.
+    let needed = |n: usize| VERTICES_PER_GAP * n.max(handles.div_ceil(2));
+    let targets = [(n_small, needed(3 * n_small)), (n_large, needed(n_large))];
+    for (n, least) in targets {
+        found[..n].iter_mut().for_each(|gap| gap.least_target = least);
+    }
+    let kept = targets.into_iter().find(|&(_, least)| least <= target);
     let (n_kept, keeps) = (kept.map_or(0, |(n, _)| n), kept.is_some());
     let mut narrow = NarrowGaps { gaps: found, n_kept, keeps, handles, stretch: DVec3::ONE, voxels: base };
     if n_kept == 0 {
@@ -236,24 +247,18 @@ impl ModelGap {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// Returns the share of the gap's sheet that lies inside a cage. A cage closes the gap if it is above one half.
+    /// Returns the share of the gap's sheet that lies inside a cage.
     pub(super) fn closed_share(&self, cage: &Cage) -> f64 {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
         inside as f64 / self.points.len() as f64
     }
 
-    /// Returns a sentence about the gap, which the cage closes, with its position. `n_before`: number of larger gaps;
-    /// `[first, voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was
+    /// Returns a sentence about the gap, of which the cage closes the `share`, with its position. `[first, voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was
     /// made.
-    pub(super) fn notice(
-        &self,
-        n_before: usize,
-        [first, voxels]: [usize; 2],
-        options: &CageOptions,
-    ) -> String {
+    pub(super) fn notice(&self, share: f64, [first, voxels]: [usize; 2], options: &CageOptions) -> String {
         let wanted = self.voxels_of(DVec3::ONE);
-        let least = (n_before + 1) * VERTICES_PER_GAP;
+        let least = self.least_target;
         let remedy = if options.voxels > 0 && voxels == first && voxels < wanted && wanted <= MAX_VOXELS {
             format!("; to keep it open, use {wanted} voxels instead of {voxels}")
         } else if least > options.target as usize && least <= MAX_TARGET as usize {
@@ -266,7 +271,8 @@ impl ModelGap {
         let middle = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
         let [x, y, z] = middle.to_array().map(|x| decimals(x, 3));
         let width = decimals(self.width, 3);
-        format!("the cage closes the gap of about {width} at ({x}, {y}, {z}){remedy}")
+        let part = if share > MAX_OPEN_SHARE { "" } else { "a part of " };
+        format!("the cage closes {part}the gap of about {width} at ({x}, {y}, {z}){remedy}")
     }
 }
 

@@ -97,6 +97,9 @@ const MIN_CLOSED_SHARE: f64 = 0.1;
 /// Share of a gap's sheet inside a cage above which the cage closes the gap.
 const MAX_OPEN_SHARE: f64 = 0.5;
 
+/// Share of a gap's sheet inside a cage above which the gap is reported.
+const MIN_REPORTED_SHARE: f64 = 0.25;
+
 /// Area of a closed gap that counts as much as a handle that the model lacks, as a fraction of the squared longest side.
 const HANDLE_AREA: f64 = 0.001;
 
@@ -165,7 +168,7 @@ fn generate_plain(
         (kind, 0) if kind != CageKind::Hull && affordable == MAX_VOXELS => {
             // The lattice for gaps does not depend on the target, so that more vertices do not close a gap.
             let clearance = options.distance(bounds);
-            gaps::narrow_gaps(&soup, bounds, clearance, [base.min(GAP_VOXELS), most_gaps], &go_on)?
+            gaps::narrow_gaps(&soup, bounds, clearance, [base.min(GAP_VOXELS), target], &go_on)?
         }
         _ => NarrowGaps {
             gaps: Vec::new(),
@@ -247,9 +250,10 @@ fn generate_plain(
             options.target
         )
     });
-    let closed =
-        model.narrow.gaps.iter().enumerate().filter(|(_, gap)| gap.closed_share(&cage) > MAX_OPEN_SHARE);
-    let closed = closed.map(|(k, gap)| gap.notice(k, [first, voxels], options));
+    let closed = model.narrow.gaps.iter().filter_map(|gap| {
+        let share = gap.closed_share(&cage);
+        (share > MIN_REPORTED_SHARE).then(|| gap.notice(share, [first, voxels], options))
+    });
     let report = CageReport {
         kind: if options.kind == CageKind::Hull { CageKind::Hull } else { CageKind::Shell },
         refusal: None,
