@@ -70,7 +70,7 @@ pub(crate) fn run(args: &ProportionsArgs, as_json: bool) -> Result<(), CliError>
         // Only the vertices are bound, for the pose of the cage.
         options = JobOptions { shape_only: true, ..JobOptions::default() };
     }
-    let format = args.output.as_ref().map_or_else(|| model.format().of_exports(), |output| output.format);
+    let format = args.output.as_ref().map_or_else(|| model.format(), |output| output.format);
     let of_mesh = |e| CliError::job(mesh, e);
     let job = Job::new(&model, format, &options).map_err(of_mesh)?;
     let at_rest = Poses::Shape(loaded.cage.positions().to_vec());

@@ -104,10 +104,10 @@ impl Kind {
     pub(crate) fn put(self, x: f64, encoding: Encoding, out: &mut Vec<u8>) {
         let start = out.len();
         match (encoding, self) {
-            (Encoding::Text, Self::F32) => {
-                out.extend(format!("{:?}", x as f32).trim_end_matches(".0").bytes())
+            (Encoding::Text, _) => {
+                let text = if self == Self::F32 { format!("{:?}", x as f32) } else { format!("{x:?}") };
+                out.extend(text.trim_end_matches(".0").bytes());
             }
-            (Encoding::Text, _) => out.extend(format!("{x:?}").trim_end_matches(".0").bytes()),
             (_, Self::I8) => out.extend((x as i8).to_le_bytes()),
             (_, Self::U8) => out.extend((x as u8).to_le_bytes()),
             (_, Self::I16) => out.extend((x as i16).to_le_bytes()),
