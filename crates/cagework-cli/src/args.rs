@@ -289,8 +289,10 @@ impl FromStr for ModelOutput {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let format = ModelFormat::of_export(text)
-            .ok_or_else(|| wrong_ending(&ModelFormat::ALL.map(ModelFormat::export_extension)))?;
+        let format = ModelFormat::of_export(text).ok_or_else(|| {
+            let written = ModelFormat::ALL.into_iter().filter(|format| format.is_written());
+            wrong_ending(&written.map(ModelFormat::export_extension).collect::<Vec<_>>())
+        })?;
         Ok(Self { path: text.into(), format })
     }
 }

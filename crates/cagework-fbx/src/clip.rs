@@ -14,6 +14,10 @@ use crate::{FbxError, Shares};
 /// Property of a channel that is its weight, percent.
 const WEIGHT: &str = "DeformPercent";
 
+/// Range of [`sample_rate`], Hz. Between two samples, a movement bends little, and files stay small.
+const MIN_RATE: f64 = 30.0;
+const MAX_RATE: f64 = 120.0;
+
 /// A clip that is being written.
 struct Clip<'a> {
     document: &'a mut Document,
@@ -50,11 +54,18 @@ fn bake(scene: &Scene, stack: &AnimStack, shares: Shares) -> Result<BakedAnimRoo
     let options = BakeOpts {
         temp_allocator: shares.allocator(),
         result_allocator: shares.allocator(),
+        resample_rate: sample_rate(scene.settings.frames_per_second),
         key_reduction_enabled: true,
         key_reduction_rotation: true,
         ..BakeOpts::default()
     };
     ufbx::bake_anim(scene, &stack.anim, options).map_err(|error| shares.fault(&error))
+}
+
+/// Samples per second of curves that are not linear: a multiple of the file's frame rate, so that frames are exact.
+fn sample_rate(frames_per_second: f64) -> f64 {
+    let rate = if (1.0..=MAX_RATE).contains(&frames_per_second) { frames_per_second } else { MIN_RATE };
+    rate * (MIN_RATE / rate).ceil()
 }
 
 /// Start and end of a clip: those that the file declares, or the first and last key if no key is between these.

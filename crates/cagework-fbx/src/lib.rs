@@ -81,9 +81,9 @@ pub fn convert(fbx: &[u8], memory_limit: u64) -> Result<Converted, FbxError> {
     let scene = load(fbx, shares)?;
     let mut document = Document::new(shares.glb, memory_limit);
     let mut notices = warnings(&scene);
-    material::write(&scene, &mut document, &mut notices)?;
+    let uv_sets = material::write(&scene, &mut document, &mut notices)?;
     let mut nodes = node::Nodes::new(&scene, &mut notices);
-    let morphed = mesh::write(&scene, shares, &mut nodes, &mut document, &mut notices)?;
+    let morphed = mesh::write(&scene, &uv_sets, shares, &mut nodes, &mut document, &mut notices)?;
     clip::write(&scene, &nodes, &morphed, shares, &mut document)?;
     nodes.finish(&mut document)?;
     notices.extend(left_out(&scene));

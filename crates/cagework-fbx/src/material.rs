@@ -21,26 +21,30 @@ struct Textures<'a> {
     /// Texture of the document for each FBX texture; `None` if its image is not readable.
     known: HashMap<u32, Option<usize>>,
     images: HashMap<u32, Option<usize>>,
+    /// Number of sets of texture coordinates that the material being written needs.
+    n_sets: usize,
     notices: &'a mut Vec<String>,
 }
 
-/// Writes all materials, in the order of the scene.
+/// Writes all materials, in the order of the scene. Returns the number of sets of texture coordinates that each needs.
 pub(crate) fn write(
     scene: &Scene,
     document: &mut Document,
     notices: &mut Vec<String>,
-) -> Result<(), FbxError> {
+) -> Result<Vec<usize>, FbxError> {
     let mut meshes: HashMap<u32, &Mesh> = HashMap::new();
     for mesh in &scene.meshes {
         for material in &mesh.materials {
             meshes.entry(material.element.typed_id).or_insert(mesh);
         }
     }
-    let mut textures = Textures { scene, known: HashMap::new(), images: HashMap::new(), notices };
-    let mut left_out = HashSet::new();
+    let mut textures = Textures { scene, known: HashMap::new(), images: HashMap::new(), n_sets: 0, notices };
+    let (mut left_out, mut n_sets) = (HashSet::new(), Vec::new());
     for material in &scene.materials {
         let mesh = meshes.get(&material.element.typed_id).copied();
+        textures.n_sets = 0;
         let written = write_one(material, mesh, &mut textures, document)?;
+        n_sets.push(textures.n_sets);
         document.push("materials", written)?;
         let pbr = &material.pbr;
         let kept = [&pbr.base_color, &pbr.emission_color, &pbr.normal_map].map(|map| id_of(map));
@@ -53,7 +57,7 @@ pub(crate) fn write(
             counted(left_out.len(), "texture", "textures")
         ));
     }
-    Ok(())
+    Ok(n_sets)
 }
 
 fn id_of(map: &MaterialMap) -> Option<u32> {
@@ -138,7 +142,9 @@ impl Textures<'_> {
         let Some(number) = number else { return Ok(None) };
         let sets = mesh.into_iter().flat_map(|mesh| &*mesh.uv_sets);
         let set = sets.filter(|set| set.vertex_uv.exists).position(|set| *set.name == *texture.uv_set);
-        Ok(Some(match set.unwrap_or(0) {
+        let set = set.unwrap_or(0);
+        self.n_sets = self.n_sets.max(set + 1);
+        Ok(Some(match set {
             0 => json!({ "index": number }),
             set => json!({ "index": number, "texCoord": set }),
         }))

@@ -49,9 +49,10 @@ struct Corners {
 }
 
 /// Writes the meshes of all nodes, and their skins. A mesh that nodes show with different materials is written for each
-/// list of materials.
+/// list of materials. `uv_sets`: number of sets of texture coordinates that each material needs.
 pub(crate) fn write(
     scene: &Scene,
+    uv_sets: &[usize],
     shares: Shares,
     nodes: &mut Nodes,
     document: &mut Document,
@@ -64,7 +65,7 @@ pub(crate) fn write(
         let materials = materials_of(node, mesh);
         let key = (mesh.element.typed_id, materials);
         if !meshes.contains_key(&key) {
-            let written = write_mesh(mesh, &key.1, shares, document)?;
+            let written = write_mesh(mesh, &key.1, uv_sets, shares, document)?;
             meshes.insert(key.clone(), written);
         }
         let Some(Some(written)) = meshes.get(&key) else { continue };
@@ -102,6 +103,7 @@ fn materials_of(node: &Node, mesh: &Mesh) -> Vec<u32> {
 fn write_mesh(
     mesh: &Mesh,
     materials: &[u32],
+    uv_sets: &[usize],
     shares: Shares,
     document: &mut Document,
 ) -> Result<Option<Written>, FbxError> {
@@ -121,6 +123,11 @@ fn write_mesh(
         if indices.is_empty() {
             continue;
         }
+        let material = materials.get(part.index as usize);
+        let n_sets = material.and_then(|&material| uv_sets.get(material as usize)).copied().unwrap_or(0);
+        // glTF requires the coordinates of a texture, also in meshes without them.
+        let n = corners.points.len();
+        corners.uvs.resize_with(n_sets.max(corners.uvs.len()), || vec![[0.0; 2]; n]);
         let mut primitive = json!({ "attributes": corners.write(mesh, document)? });
         if let Some(deformer) = skin::of(mesh) {
             let sets = skin::influences(deformer, &corners.points, &mut has_own_joint);
@@ -131,8 +138,8 @@ fn write_mesh(
             }
         }
         primitive["indices"] = document.indices(&indices)?.into();
-        if let Some(material) = materials.get(part.index as usize) {
-            primitive["material"] = (*material).into();
+        if let Some(&material) = material {
+            primitive["material"] = material.into();
         }
         if !shapes.is_empty() {
             let order = corners.by_point();

@@ -16,6 +16,8 @@ pub(crate) struct Nodes {
     roots: Vec<usize>,
     /// Local transforms at rest. `[n_nodes]`
     pub(crate) rest: Vec<Rest>,
+    /// Joints of each skin.
+    skins: Vec<Vec<usize>>,
     /// Number of each FBX node, by its index in the scene; `None` for the root, until a joint needs it.
     numbers: Vec<Option<usize>>,
 }
@@ -28,6 +30,8 @@ pub(crate) struct Rest {
     pub(crate) scale: Vec3,
 }
 
+/// Name of an additional node at the world origin.
+const ROOT: &str = "root";
 const IDENTITY: Rest = Rest { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
 
 impl Nodes {
@@ -38,8 +42,14 @@ impl Nodes {
             numbers.push((!node.is_root).then_some(next));
             next += usize::from(!node.is_root);
         }
-        let mut nodes =
-            Self { items: Vec::new(), children: Vec::new(), roots: Vec::new(), rest: Vec::new(), numbers };
+        let mut nodes = Self {
+            items: Vec::new(),
+            children: Vec::new(),
+            roots: Vec::new(),
+            rest: Vec::new(),
+            skins: Vec::new(),
+            numbers,
+        };
         let mut n_faults = 0;
         for node in scene.nodes.iter().filter(|node| !node.is_root) {
             let rest = Rest::of(&node.local_transform);
@@ -87,7 +97,7 @@ impl Nodes {
         if let Some(number) = self.number(node) {
             return number;
         }
-        let number = self.add("root", IDENTITY, Vec::new());
+        let number = self.add(ROOT, IDENTITY, Vec::new());
         self.roots.push(number);
         if let Some(place) = self.numbers.get_mut(node.element.typed_id as usize) {
             *place = Some(number);
@@ -103,13 +113,34 @@ impl Nodes {
         copy
     }
 
+    /// Stores the joints of a skin, which must have a common ancestor.
+    pub(crate) fn add_skin(&mut self, joints: &[usize]) {
+        self.skins.push(joints.to_vec());
+    }
+
+    /// Whether the joints of a skin are below several nodes without a parent.
+    fn has_split_skin(&self) -> bool {
+        let mut root = vec![None; self.items.len()];
+        let mut stack: Vec<(usize, usize)> = self.roots.iter().map(|&node| (node, node)).collect();
+        while let Some((node, top)) = stack.pop() {
+            root[node] = Some(top);
+            stack.extend(self.children[node].iter().map(|&child| (child, top)));
+        }
+        let is_split = |joints: &Vec<usize>| joints.iter().any(|&joint| root[joint] != root[joints[0]]);
+        self.skins.iter().any(is_split)
+    }
+
     /// Sets a member of a node.
     pub(crate) fn set(&mut self, number: usize, member: &str, value: Value) {
         self.items[number].insert(member.into(), value);
     }
 
     /// Writes nodes and scene.
-    pub(crate) fn finish(self, document: &mut Document) -> Result<(), FbxError> {
+    pub(crate) fn finish(mut self, document: &mut Document) -> Result<(), FbxError> {
+        if self.has_split_skin() {
+            let all = std::mem::take(&mut self.roots);
+            self.roots = vec![self.add(ROOT, IDENTITY, all)];
+        }
         for (mut item, children) in self.items.into_iter().zip(self.children) {
             if !children.is_empty() {
                 item.insert("children".into(), json!(children));

@@ -62,6 +62,7 @@ impl Skins {
             joints.push(joint);
             binds.push(bind.to_cols_array());
         }
+        nodes.add_skin(&joints);
         let bind = document.floats(&binds, None, false)?;
         let skin = document.push("skins", json!({ "joints": joints, "inverseBindMatrices": bind }))?;
         self.0.insert(key, skin);

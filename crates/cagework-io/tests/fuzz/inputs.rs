@@ -17,8 +17,8 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
 
 use crate::common::{
-    Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, package, plain_cube, plate, plate_parts, quantized,
-    read, rigged, skinned, textured_square, twist,
+    Builder, CUBE_OBJ, U8, cube, fbx, glb, instanced, json_of, package, plain_cube, plate, plate_parts,
+    quantized, read, rigged, skinned, textured_square, twist,
 };
 
 /// Number of GLB samples, which precede all other samples.
@@ -106,6 +106,8 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     // SPZ 4 with compressed blocks, and with uncompressed blocks, in which damaged bytes change the decoded values.
     samples.push(include_bytes!("../splats/helix-4.spz").to_vec());
     samples.push(include_bytes!("../splats/six-4.spz").to_vec());
+    samples
+        .extend([fbx::placed(), fbx::rigged()].iter().flat_map(|file| [fbx::text(file), fbx::binary(file)]));
     samples
 }
 
