@@ -1,7 +1,8 @@
 // Builds the npm package into web/package/dist, from its sources and the output of `cargo xtask wasm`.
 //
 // Modules are not bundled. They refer to workers and wasm files in a form that browsers, Node and bundlers understand.
-// Only the decoders of compressed files are bundled, so that the package has no dependencies.
+// Only the decoders of compressed files and the converter of FBX files are bundled, so that the package has no
+// dependencies.
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -41,17 +42,20 @@ for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true }))
   writeFileSync(path, whole(readFileSync(path, "utf8")));
 }
 
-await build({
-  configFile: false,
-  root: here,
-  logLevel: "error",
-  // Without `process`, Draco's decoder does not look for its files in Node's folders.
-  define: { process: "undefined" },
-  build: {
-    outDir: dist,
-    emptyOutDir: false,
-    target: "es2023",
-    license: { fileName: "licences-npm.json" },
-    lib: { entry: join(here, "src/decode.ts"), formats: ["es"], fileName: () => "decode.js" },
-  },
-});
+for (const name of ["decode", "fbx"]) {
+  await build({
+    configFile: false,
+    root: here,
+    logLevel: "error",
+    // Without `process`, Draco's decoder does not look for its files in Node's folders.
+    define: { process: "undefined" },
+    build: {
+      outDir: dist,
+      emptyOutDir: false,
+      target: "es2023",
+      // The converter contains no npm package.
+      ...(name === "decode" ? { license: { fileName: "licences-npm.json" } } : {}),
+      lib: { entry: join(here, `src/${name}.ts`), formats: ["es"], fileName: () => `${name}.js` },
+    },
+  });
+}

@@ -6,10 +6,14 @@
 
 mod clip;
 mod document;
+#[cfg(target_family = "wasm")]
+mod libc;
 mod material;
 mod mesh;
 mod node;
 mod skin;
+#[cfg(target_family = "wasm")]
+mod web;
 
 use cagework_core::words::{counted, size_rounded_down};
 use thiserror::Error;
@@ -19,6 +23,8 @@ use ufbx::{
 };
 
 use document::Document;
+#[cfg(target_family = "wasm")]
+pub use web::ConvertedFbx;
 
 /// Limit on the depth of the tree of nodes. Rigs have less than 100 levels.
 const MAX_DEPTH: u32 = 1000;

@@ -41,11 +41,12 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, of_web(folder, &NPM_LICENCES)?)
 }
 
-/// Lists the packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`.
+/// Lists the packages compiled into the wasm files, and the npm packages in Vite's lists `of_npm` in `folder`.
 /// Deletes the lists.
 fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
+    parts.extend(of_crates("cagework-fbx", target, &[])?);
     parts.extend(of_crates("cagework-web", target, &["--no-default-features", "--features", "webgl"])?);
     for name in of_npm {
         let said = folder.join(name);

@@ -156,7 +156,6 @@ formats! {
         endings: &["fbx"],
         read_only: &["fbx"],
         naming: &["fbx"],
-        companions: &["png", "jpg", "jpeg"],
         is: |bytes| bytes.starts_with(b"Kaydara FBX Binary"),
         is_text: |text| text.starts_with(b"; FBX"),
         read: |source| source.fbx(),

@@ -1,6 +1,7 @@
 /** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
 import type { BuiltSample, CageArrays, CheckedCage, Reading } from "../contract";
+import { extension } from "../names";
 import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
@@ -8,19 +9,24 @@ import type { Jobs, ReadModel } from "./messages";
 import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
 
+/** First bytes of a binary FBX file. */
+const FBX_BINARY = "Kaydara FBX Binary";
+
 type ReadListener = (step: Reading) => void;
 
 const say = (tell: ReadListener, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
-/** Reads a model: decompresses it if needed, decodes textures, and checks the cage of a project. */
+/** Reads a model: converts or decompresses it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
   { files, up, used }: Jobs["read"]["input"],
   tell: ReadListener,
 ): Promise<ReadModel> {
-  const loaded = await read(pkg, files, tell);
+  const notices: string[] = [];
+  const loaded = await read(pkg, files, tell, notices);
   if (up) loaded.setUp(up);
-  return packed(pkg, loaded, used, tell);
+  const model = await packed(pkg, loaded, used, tell);
+  return { ...model, notices: [...notices, ...model.notices] };
 }
 
 /** Gives clothes the joints, joint weights and morph targets of a body. */
@@ -112,10 +118,12 @@ export function checked(pkg: Package, cage: CageArrays, model: Float32Array, smo
   return { ...cage, check: pkg.Binder.checkCage(model, { ...cage, controls }) };
 }
 
+/** Reads a file. Adds what a conversion lost to `lost`. */
 export async function read(
   pkg: Package,
   files: Jobs["read"]["input"]["files"],
   tell: ReadListener,
+  lost: string[] = [],
 ): Promise<LoadedModel> {
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
@@ -125,6 +133,13 @@ export async function read(
     say(tell, "geometry");
     return pkg.LoadedModel.read(name, bytes, sibling);
   };
+  if (await isFbx(name, content)) {
+    say(tell, "convert");
+    const { convert } = await loadPart(import("../fbx"));
+    const { glb, notices } = await convert(name, await readBytes(name, content));
+    lost.push(...notices);
+    return load(new Blob([glb as BlobPart]));
+  }
   try {
     return await load(content);
   } catch (error) {
@@ -136,4 +151,10 @@ export async function read(
     loaded.setPacked(file);
     return loaded;
   }
+}
+
+/** Whether a file is an FBX: the module converts it before it reads it. */
+async function isFbx(name: string, content: Blob): Promise<boolean> {
+  const start = new TextDecoder().decode(await readBytes(name, content.slice(0, FBX_BINARY.length)));
+  return start === FBX_BINARY || (extension(name) === "fbx" && !start.startsWith("glTF"));
 }

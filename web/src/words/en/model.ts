@@ -102,6 +102,7 @@ export const opening = {
   repairing: "Repairing the cage",
   stages: {
     bytes: "Reading the file",
+    convert: "Converting",
     decompress: "Decompressing",
     geometry: "Finding vertices and faces",
     textures: "Decoding textures",
@@ -120,7 +121,7 @@ export const opening = {
   get kinds() {
     return `Cagework opens ${endings("conjunction")} files.`;
   },
-  companions: "These files belong to a .gltf or .obj file. Open that file together with them.",
+  companions: "These files belong to a .gltf, .fbx or .obj file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
     const what =
