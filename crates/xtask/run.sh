@@ -7,6 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 # Debian packages, as "command package...". They are installed only if the command is missing.
 debian_packages=(
   "cc gcc libc6-dev"
+  "clang clang"
 )
 
 missing=()

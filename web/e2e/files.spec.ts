@@ -3,7 +3,7 @@
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { box, boxFaces, dracoGlb, glb, gltfFiles, meshoptGlb, obj, objOf } from "./models";
+import { box, boxFaces, dracoGlb, fbx, glb, gltfFiles, meshoptGlb, obj, objOf } from "./models";
 import {
   bound,
   cagePositions,
@@ -25,17 +25,19 @@ test("good files get a cage and can be dragged, bad files leave the model open a
   const worm = [{ name: "worm.glb", bytes: await glb() }];
   const draco = [{ name: "draco.glb", bytes: await dracoGlb() }];
   const meshopt = [{ name: "meshopt.glb", bytes: await meshoptGlb() }];
+  const tetra = [{ name: "tetra.fbx", bytes: fbx() }];
   const inItsCage = [
     { name: "tetra.obj", bytes: obj(1) },
     { name: "tetra-cage.obj", bytes: obj(1.5) },
   ];
   await open(page);
-  for (const files of [worm, draco, meshopt, inItsCage, await gltfFiles()]) {
+  for (const files of [worm, draco, meshopt, tetra, inItsCage, await gltfFiles()]) {
     const name = files[0]?.name ?? "";
     await test.step(name, async () => {
       await drop(page, files);
       await expect(page).toHaveTitle(new RegExp(name));
       await bound(page);
+      if (files === tetra) expect(Math.max(...(await modelPositions(page)))).toBeCloseTo(1);
       if (files === inItsCage) expect((await cagePositions(page)).length).toBe(3 * 4);
       await drag(page, 30, 20);
       await shoot(page, `dropped-${name}`);

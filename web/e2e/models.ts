@@ -186,6 +186,43 @@ export function objOf({ positions, faces }: Mesh): Uint8Array {
   return new TextEncoder().encode(`${lines.join("\n")}\n`);
 }
 
+/** Writes a tetrahedron as FBX text, in centimetres with y up. Its corners are at 1 m or -1 m of each axis. */
+export function fbx(): Uint8Array {
+  const corners = [
+    [1, 1, 1],
+    [-1, -1, 1],
+    [-1, 1, -1],
+    [1, -1, -1],
+  ].flatMap((corner) => corner.map((x) => 100 * x));
+  const indices = [0, 1, -4, 0, 2, -2, 0, 3, -3, 1, 2, -4];
+  return new TextEncoder().encode(`; FBX 7.4.0 project file
+FBXHeaderExtension: {
+  FBXVersion: 7400
+}
+GlobalSettings: {
+  Properties70: {
+    P: "UnitScaleFactor", "double", "Number", "", 1.0
+  }
+}
+Objects: {
+  Geometry: 1, "Geometry::tetra", "Mesh" {
+    Vertices: *${corners.length} {
+      a: ${corners.join(",")}
+    }
+    PolygonVertexIndex: *${indices.length} {
+      a: ${indices.join(",")}
+    }
+  }
+  Model: 2, "Model::tetra", "Mesh" {
+  }
+}
+Connections: {
+  C: "OO", 2, 0
+  C: "OO", 1, 2
+}
+`);
+}
+
 /** Writes a box as OBJ. */
 export function box(half: number | readonly [number, number, number]): Uint8Array {
   return objOf(boxFaces(half));

@@ -1,10 +1,12 @@
 // Builds the npm package into web/package/dist, from its sources and the output of `cargo xtask wasm`.
 //
 // Modules are not bundled. They refer to workers and wasm files in a form that browsers, Node and bundlers understand.
+// Only the converter of FBX files is bundled, because it names the address of its wasm file as bundlers do.
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join, relative } from "node:path";
+import { build } from "vite";
 
 const here = import.meta.dirname;
 const dist = join(here, "dist");
@@ -38,3 +40,15 @@ for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true }))
   }
   writeFileSync(path, whole(readFileSync(path, "utf8")));
 }
+
+await build({
+  configFile: false,
+  root: here,
+  logLevel: "error",
+  build: {
+    outDir: dist,
+    emptyOutDir: false,
+    target: "es2023",
+    lib: { entry: join(here, "src/fbx.ts"), formats: ["es"], fileName: () => "fbx.js" },
+  },
+});

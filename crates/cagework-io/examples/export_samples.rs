@@ -15,7 +15,7 @@ use cagework_core::splats::{Splats, n_harmonics};
 use cagework_io::{
     Interpolation, Model, ModelFormat, Player, ReshapeOptions, Timeline, TransferOptions, write_mesh_glb,
 };
-use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
+use common::{CUBE_OBJ, PNG, fbx, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::{DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
@@ -47,6 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("quantized.glb", quantized().glb()),
         ("flattened.glb", flat.glb()),
         ("no-nodes.glb", bare.glb()),
+        ("placed.fbx", fbx::binary(&fbx::placed())),
+        ("rigged.fbx", fbx::text(&fbx::rigged())),
         ("box.obj", CUBE_OBJ.as_bytes().to_vec()),
         (
             "smooth.obj",

@@ -13,6 +13,7 @@ mod archive;
 mod blender;
 mod counts;
 mod error;
+mod fbx;
 mod gltf;
 mod look;
 mod memory;
@@ -45,6 +46,7 @@ mod up;
 pub use blender::write_field_blender;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
+pub use fbx::FbxError;
 pub use gltf::{
     Clip, Feet, GltfError, Ground, JointPlayer, JointPoint, Joints, PROJECT_EXTENSION, Player,
     ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,

@@ -19,6 +19,7 @@ use glam::{DVec3, Quat, Vec3};
 use thiserror::Error;
 
 use crate::counts::Counts;
+use crate::fbx::FbxError;
 use crate::gltf::{self, GltfDocument, GltfError};
 use crate::look::Look;
 use crate::obj::{self, ObjError, PolygonDocument};
@@ -70,6 +71,14 @@ pub enum ReadError {
         name: String,
         /// What is wrong in the file.
         source: SplatError,
+    },
+    /// Error in an FBX file.
+    #[error("{}: {source}", shown(name))]
+    Fbx {
+        /// Name given by the caller.
+        name: String,
+        /// What is wrong in the file.
+        source: FbxError,
     },
     /// Error in a glTF file.
     #[error("{}: {source}", shown(name))]

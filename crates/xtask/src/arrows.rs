@@ -33,8 +33,14 @@ const RULES: &[Rule] = &[
         must_not_use: &["wgpu", "naga", "gltf", "gltf-json", "wasm-bindgen", "web-sys", "js-sys", "clap"],
     },
     Rule {
+        name: "cagework-fbx",
+        may_use: &["cagework-core"],
+        // wasm-bindgen is allowed: the page has a wasm file of this crate alone.
+        must_not_use: &["wgpu", "naga", "web-sys", "clap", "rayon"],
+    },
+    Rule {
         name: "cagework-io",
-        may_use: &["cagework-core", "cagework-pose"],
+        may_use: &["cagework-core", "cagework-fbx", "cagework-pose"],
         // wasm-bindgen is allowed: on wasm32, zip depends on it through getrandom, but never calls it here.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },

@@ -41,10 +41,11 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, [of_wasm()?, of_bundle(folder)?].concat())
 }
 
-/// Lists the packages compiled into the two wasm files.
+/// Lists the packages compiled into the wasm files.
 fn of_wasm() -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
+    parts.extend(of_crates("cagework-fbx", target, &[])?);
     parts.extend(of_crates("cagework-web", target, &["--no-default-features", "--features", "webgl"])?);
     Ok(parts)
 }

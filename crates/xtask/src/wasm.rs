@@ -25,34 +25,58 @@ impl Profile {
     }
 }
 
-/// One of the two builds of `cagework-web`, for browsers with and without WebGPU.
+/// A wasm file: the converter of FBX files, or one of the two builds of `cagework-web`, for browsers with and without
+/// WebGPU.
 struct Artifact {
-    /// Arguments of Cargo that select the features.
-    features: &'static [&'static str],
+    /// Cargo's subcommand, and arguments that select the package and its features.
+    build: &'static [&'static str],
+    /// Name of Cargo's output.
+    output: &'static str,
     /// Folder of the generated JavaScript package; ignored by git.
     package: &'static str,
     /// Name of the generated files, without extension.
     name: &'static str,
 }
 
-/// Both builds, in build order. Cargo keeps only the artifact of the last build, and must link the other build again.
-/// The build for browsers with WebGPU comes last, because developers repeat it most often.
-const ARTIFACTS: [Artifact; 2] = [
+/// All artifacts, in build order. Cargo keeps only the artifact of the last build of `cagework-web`, and must link the
+/// other build again. The build for browsers with WebGPU comes last, because developers repeat it most often.
+const ARTIFACTS: [Artifact; 3] = [
     Artifact {
-        features: &["--no-default-features", "--features", "webgl"],
+        build: &["rustc", "--package", "cagework-fbx", "--crate-type", "cdylib"],
+        output: "cagework_fbx.wasm",
+        package: "web/package/src/pkg-fbx",
+        name: "cagework_fbx",
+    },
+    Artifact {
+        build: &["build", "--package", "cagework-web", "--no-default-features", "--features", "webgl"],
+        output: "cagework_web.wasm",
         package: "web/package/src/pkg-webgl",
         name: "cagework_webgl",
     },
-    Artifact { features: &[], package: "web/package/src/pkg", name: "cagework" },
+    Artifact {
+        build: &["build", "--package", "cagework-web"],
+        output: "cagework_web.wasm",
+        package: "web/package/src/pkg",
+        name: "cagework",
+    },
 ];
 
 /// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 support 128-bit vectors. The vectorizer must be added to
 /// LLVM's passes by name: otherwise all loops stay scalar at any optimization level, and a bind takes 1.6 times as long.
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
+/// Compiler, archiver and flags for the C code of `ufbx`, as its build script expects them. Its calls of the C library
+/// become calls of functions in `cagework-fbx`.
+const C_COMPILER: [(&str, &str); 3] = [
+    ("CC_wasm32_unknown_unknown", "clang"),
+    ("AR_wasm32_unknown_unknown", "ar"),
+    ("CFLAGS_wasm32_unknown_unknown", "-DUFBX_NO_LIBC -DUFBX_NO_STDIO -Oz"),
+];
+
 /// Files and folders that the packages are built from.
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 12] = [
     "crates/cagework-core",
+    "crates/cagework-fbx",
     "crates/cagework-cage",
     "crates/cagework-pose",
     "crates/cagework-io",
@@ -68,8 +92,8 @@ const SOURCES: [&str; 11] = [
 /// File in each package that contains the name of its profile.
 const PROFILE: &str = "profile.txt";
 
-/// Builds both JavaScript packages with [`Profile::Web`], unless both are newer than all sources. Cargo keeps only the
-/// artifact of the last build, so building up-to-date packages again would link both, which takes five minutes on two
+/// Builds all JavaScript packages with [`Profile::Web`], unless both are newer than all sources. Cargo keeps only the
+/// artifact of the last build, so building up-to-date packages again would link all, which takes five minutes on two
 /// cores.
 ///
 /// # Errors
@@ -97,20 +121,20 @@ fn newest(path: &Path) -> Option<SystemTime> {
     entries.flatten().filter_map(|entry| newest(&entry.path())).max()
 }
 
-/// Builds `crates/cagework-web` for the browser, once for each of [`ARTIFACTS`], and generates their JavaScript
-/// packages.
+/// Builds [`ARTIFACTS`] for the browser, and generates their JavaScript packages.
 ///
 /// # Errors
 /// When a step fails.
 pub(crate) fn build(profile: Profile) -> Result<(), String> {
     let name = profile.name();
     let folder = if profile == Profile::Dev { "debug" } else { name };
-    let wasm = target_folder()?.join("wasm32-unknown-unknown").join(folder).join("cagework_web.wasm");
+    let output = target_folder()?.join("wasm32-unknown-unknown").join(folder);
+    let variables = [&[("RUSTFLAGS", RUSTFLAGS)], &C_COMPILER[..]].concat();
     for artifact in &ARTIFACTS {
-        let target = ["--target", "wasm32-unknown-unknown", "--profile", name];
-        let build = ["build", "--locked", "--package", "cagework-web", "--lib"];
-        run("cargo", &[&build[..], &target, artifact.features].concat(), &[("RUSTFLAGS", RUSTFLAGS)])?;
-        bindgen(&wasm, artifact, profile)?;
+        let target = ["--locked", "--lib", "--target", "wasm32-unknown-unknown", "--profile", name];
+        let [subcommand, build @ ..] = artifact.build else { continue };
+        run("cargo", &[&[*subcommand], &target[..], build].concat(), &variables)?;
+        bindgen(&output.join(artifact.output), artifact, profile)?;
     }
     Ok(())
 }

@@ -26,7 +26,7 @@ pub(crate) struct ClipArgs {
     /// walk-0001.ply; a mesh with its weights as one .glb with a morph target per frame, or as a sequence.
     #[arg(long, value_name = "CLIP", requires = "rig", requires = "output", value_parser = NonEmptyStringValueParser::new(), conflicts_with_all = ["pose", "name", "expression", "pose_controls", "times", "interpolation", "lattice", "dynamic", "rigid", "mask", "ground", "feet"])]
     pub(crate) clip: Option<String>,
-    /// Humanoid rig with the clip (.glb, .vrm, .gltf). Its joints are fitted to the model: by the limbs of both, or else by
+    /// Humanoid rig with the clip (.glb, .vrm, .gltf, .fbx). Its joints are fitted to the model: by the limbs of both, or else by
     /// their boxes.
     #[arg(long, value_name = "FILE", requires = "clip")]
     pub(crate) rig: Option<PathBuf>,

@@ -13,7 +13,7 @@ use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs};
 #[command(mut_arg("backend", |arg| arg.hide(true)))]
 #[command(mut_arg("shape_only", |arg| arg.help("Write the mesh only, without skin and clips")))]
 #[command(
-    after_help = "Each model is written under its own name (.gltf as .glb) as soon as it is done. If a model fails, the \
+    after_help = "Each model is written under its own name (.gltf and .fbx as .glb) as soon as it is done. If a model fails, the \
     error is printed and the other models are still written; the exit code is then 1.\n\n\
     Examples:\n  \
     cagework refit jacket.glb trousers.glb --cage body.obj --pose bulky.obj -o out\n  \

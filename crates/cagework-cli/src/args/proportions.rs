@@ -31,7 +31,7 @@ use super::{CageSource, ModelOutput, ReadArgs, RigArgs, SolveArgs, number, obj_o
 #[command(group = clap::ArgGroup::new("result").required(true).multiple(true).args(["output", "pose_out", "ranges", "presets"]))]
 pub(crate) struct ProportionsArgs {
     /// Rigged humanoid.
-    #[arg(help = "Rigged humanoid (.glb, .vrm, .gltf)", required_unless_present = "presets")]
+    #[arg(help = "Rigged humanoid (.glb, .vrm, .gltf, .fbx)", required_unless_present = "presets")]
     pub(crate) mesh: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) read: ReadArgs,

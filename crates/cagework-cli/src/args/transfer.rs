@@ -14,7 +14,7 @@ use super::{ReadArgs, glb_output, mesh_help};
     cagework transfer body.glb shirt.obj --push-out 0.002 -o shirt.glb"
 )]
 pub(crate) struct TransferArgs {
-    /// Body with a skeleton or morph targets (.glb, .gltf, .vrm).
+    /// Body with a skeleton or morph targets (.glb, .gltf, .vrm, .fbx).
     pub(crate) body: PathBuf,
     #[arg(help = mesh_help("Clothes, to get a skeleton without one of their own"))]
     pub(crate) clothes: PathBuf,

@@ -11,7 +11,7 @@ use crate::shown::{shown, without_byte_order_mark};
 use crate::siblings::Resolve;
 use crate::splats::{records, sog, spz};
 use crate::up::UpAxis;
-use crate::{gltf, obj, off, ply, stl, threemf};
+use crate::{fbx, gltf, obj, off, ply, stl, threemf};
 
 /// Extensions, MIME types and capabilities of a format, and the functions that read and write it.
 #[derive(Debug)]
@@ -155,6 +155,19 @@ formats! {
         ],
         is_unmarked: false,
     };
+    /// Autodesk FBX, binary or text, to read. The model's document is a glTF, and GLB is its format.
+    Fbx = "fbx": FormatFacts {
+        endings: &["fbx"],
+        read_only: &["fbx"],
+        naming: &["fbx"],
+        is: |bytes| bytes.starts_with(b"Kaydara FBX Binary"),
+        is_text: |text| text.starts_with(b"; FBX"),
+        read: |source| source.fbx(),
+        named_files: |bytes, _, memory_limit| fbx::named_files(bytes, memory_limit),
+        write: Model::write_glb,
+        keeps: &[ModelProperty::Faces, ModelProperty::Rig, ModelProperty::Poses],
+        ..DEFAULT_FACTS
+    };
     /// Wavefront OBJ.
     Obj = "obj": FormatFacts {
         endings: &["obj"],
@@ -264,7 +277,7 @@ formats! {
 pub struct FormatError {
     /// Name given by the caller.
     pub name: String,
-    /// Description of the content, such as "an FBX file".
+    /// Description of the content, such as "a Blender file".
     pub found: &'static str,
     /// Advice to the user.
     pub hint: String,
@@ -306,6 +319,12 @@ impl ModelFormat {
         }
     }
 
+    /// Whether files of this format are written, not only read.
+    #[must_use]
+    pub fn is_written(self) -> bool {
+        !self.facts().read_only.contains(&self.export_extension())
+    }
+
     pub(crate) fn keeps(self, what: ModelProperty) -> bool {
         self.facts().keeps.contains(&what)
     }
@@ -324,7 +343,7 @@ impl ModelFormat {
 
     /// Extensions of the formats that can be written and keep the property `what`, as text: "OBJ, PLY, OFF or 3MF".
     pub(crate) fn listed(what: ModelProperty) -> String {
-        let all = Self::ALL.into_iter().filter(|format| format.keeps(what));
+        let all = Self::ALL.into_iter().filter(|format| format.is_written() && format.keeps(what));
         let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();
         names.split_last().map_or(String::new(), |(last, others)| format!("{} or {last}", others.join(", ")))
     }
@@ -382,7 +401,6 @@ impl ModelFormat {
             [b'P', b'K', 3, 4, ..] if !["3mf", "sog"].contains(&ending.as_str()) => {
                 return fault("a zip archive", "unpack it first");
             }
-            [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", &export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", &export),
             [0xff, 0xfe, ..]
             | [0xfe, 0xff, ..]
@@ -398,7 +416,7 @@ impl ModelFormat {
         if let Some(found) = Self::ALL.into_iter().find(|format| (format.facts().is_text)(text)) {
             return Ok(found);
         }
-        if ["fbx", "dae", "usdz", "usd", "3ds", "blend"].contains(&ending.as_str()) {
+        if ["dae", "usdz", "usd", "3ds", "blend"].contains(&ending.as_str()) {
             return fault("in an unsupported format", &export);
         }
         let format = Self::of_ending(&ending).unwrap_or(Self::Obj);

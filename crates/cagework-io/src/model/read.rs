@@ -14,7 +14,7 @@ use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::siblings::Resolve;
 use crate::splats::{self, Capture, RawSplats, ReadSplats, Records, SplatError};
 use crate::up::UpAxis;
-use crate::{gltf, obj, ply};
+use crate::{fbx, gltf, obj, ply};
 
 /// A file to read.
 pub(super) struct Source<'a, 'b> {
@@ -77,6 +77,16 @@ impl Source<'_, '_> {
             document: Document::Gltf(Box::new(model.document)),
             capture: None,
         })
+    }
+
+    /// Converts an FBX file to a GLB, and reads that.
+    pub(super) fn fbx(mut self) -> Result<Model, ReadError> {
+        let fault = |source| ReadError::Fbx { name: self.name.into(), source };
+        let fbx::Converted { glb, notices } = fbx::convert(&self.bytes, self.memory_limit).map_err(fault)?;
+        self.bytes = glb.into();
+        let mut model = self.gltf()?;
+        model.notices.splice(0..0, notices);
+        Ok(model)
     }
 
     pub(super) fn obj(self) -> Result<Model, ReadError> {

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, reason = "each test file uses only some of these helpers")]
 
+pub(crate) mod fbx;
+
 use cagework_io::{Model, ReadError};
 use glam::{Mat4, Vec3};
 use serde_json::{Value, json};

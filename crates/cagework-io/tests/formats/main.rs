@@ -8,6 +8,7 @@ mod common;
 
 mod compressed;
 mod far;
+mod fbx;
 mod glb_export;
 mod gltf_bad;
 mod gltf_read;

@@ -154,7 +154,7 @@ fn unsupported_formats_are_named_with_a_hint() {
         ("a.obj", &b""[..], "empty"),
         ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
         ("a.npz", b"PK\x03\x04rest", "weights or arrays, not a model: export it as"),
-        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY, STL, OFF or 3MF"),
+        ("a.blend", b"BLENDER", "export it as GLB, OBJ, PLY, STL, OFF or 3MF"),
         ("a.stl", b"solid x", "damaged: it has no text facets"),
         ("a.glb", b"glXF", "not a GLB"),
         ("a.ply", b"solid", "not a PLY"),

@@ -18,8 +18,8 @@ use serde_json::{Value, json};
 use zip::ZipArchive;
 
 use crate::common::{
-    Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, package, plain_cube, plate, plate_parts, quantized,
-    read, rigged, skinned, textured_square, twist,
+    Builder, CUBE_OBJ, U8, cube, fbx, glb, instanced, json_of, package, plain_cube, plate, plate_parts,
+    quantized, read, rigged, skinned, textured_square, twist,
 };
 
 /// A SOG of 240 splats with spherical harmonics of degree 1.
@@ -112,6 +112,8 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     samples.push(include_bytes!("../splats/six-4.spz").to_vec());
     samples.push(include_bytes!("../splats/helix.compressed.ply").to_vec());
     samples.push(SOG.to_vec());
+    samples
+        .extend([fbx::placed(), fbx::rigged()].iter().flat_map(|file| [fbx::text(file), fbx::binary(file)]));
     samples
 }
 

@@ -35,7 +35,7 @@ def reshape_files(
     work: Callable[..., bytes] = reshape,
     **options: Any,
 ) -> list[dict[str, str]]:
-    """Reshapes files into the folder `out`, keeping their names; a .gltf becomes a .glb.
+    """Reshapes files into the folder `out`, keeping their names; a .gltf or .fbx becomes a .glb.
 
     cage, posed ([n_cage, 3], object units) and options are those of cagework.reshape. client: Dask client; None uses the default client,
     or starts worker processes on this machine. files_per_task: larger values reduce overhead for small files. work: function called for
@@ -58,7 +58,7 @@ def reshape_files(
         raise ValueError(f"files_per_task is {files_per_task}; it must be at least 1")
     jobs: dict[Path, Path] = {}
     for file in map(Path, files):
-        output = Path(out) / (file.with_suffix(".glb") if file.suffix.lower() == ".gltf" else file).name
+        output = Path(out) / (file.with_suffix(".glb") if file.suffix.lower() in (".gltf", ".fbx") else file).name
         if Path(out).resolve() in (file.parent.resolve(), file.resolve().parent):
             raise ValueError(f"{file} is in the output folder {out}: choose another one")
         other = jobs.setdefault(output.absolute(), file.absolute())

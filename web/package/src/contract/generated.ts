@@ -881,7 +881,7 @@ export type Method = "classic" | "embedded";
 /**
  * File format of a model.
  */
-export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz" | "sog";
+export type ModelFormat = "gltf" | "fbx" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz" | "sog";
 /**
  * Combined properties of all models in the cage.
  */
@@ -1624,13 +1624,13 @@ export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"pos
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
-export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off", "3mf", "splat", "spz", "sog"] as const;
+export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "fbx", "obj", "ply", "stl", "off", "3mf", "splat", "spz", "sog"] as const;
 /** Names of model files whose extension is not that of a model. */
 export const MODEL_NAMES = ["meta.json"] as const;
 /** MIME types of models. */
 export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json", "model/obj", "model/stl", "model/3mf"] as const;
 /** Extensions of models that refer to other files. */
-export const NAMING_ENDINGS = ["gltf", "obj", "json"] as const;
+export const NAMING_ENDINGS = ["gltf", "fbx", "obj", "json"] as const;
 /** Extensions of these other files. */
 export const COMPANION_ENDINGS = ["bin", "png", "jpg", "jpeg", "webp", "ktx2", "mtl"] as const;
 /** Formats that store only a shape. */

@@ -18,7 +18,7 @@ export interface NamedFile {
 
 /** Progress of reading a file. */
 export interface Reading {
-  readonly stage: "bytes" | "geometry" | "textures" | "check";
+  readonly stage: "bytes" | "convert" | "geometry" | "textures" | "check";
   /** Finished fraction of the stage, 0 to 1; 0 if unknown. */
   readonly fraction: number;
 }

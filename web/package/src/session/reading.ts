@@ -1,25 +1,32 @@
 /** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
 import type { BuiltSample, CageArrays, CheckedCage, Reading } from "../contract";
+import { extension } from "../names";
 import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
-import { readFiles, siblingOf, toWasm } from "./files";
+import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
+import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
+
+/** First bytes of a binary FBX file. */
+const FBX_BINARY = "Kaydara FBX Binary";
 
 type ReadListener = (step: Reading) => void;
 
 const say = (tell: ReadListener, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
-/** Reads a model, decodes textures, and checks the cage of a project. */
+/** Reads a model: converts it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
   { files, up, used }: Jobs["read"]["input"],
   tell: ReadListener,
 ): Promise<ReadModel> {
-  const loaded = await read(pkg, files, tell);
+  const notices: string[] = [];
+  const loaded = await read(pkg, files, tell, notices);
   if (up) loaded.setUp(up);
-  return packed(pkg, loaded, used, tell);
+  const model = await packed(pkg, loaded, used, tell);
+  return { ...model, notices: [...notices, ...model.notices] };
 }
 
 /** Gives clothes the joints, joint weights and morph targets of a body. */
@@ -111,14 +118,30 @@ export function checked(pkg: Package, cage: CageArrays, model: Float32Array, smo
   return { ...cage, check: pkg.Binder.checkCage(model, { ...cage, controls }) };
 }
 
+/** Reads a file. Adds what a conversion lost to `lost`. */
 export async function read(
   pkg: Package,
   files: Jobs["read"]["input"]["files"],
   tell: ReadListener,
+  lost: string[] = [],
 ): Promise<LoadedModel> {
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
-  const bytes = await toWasm(pkg, name, content, (share) => say(tell, "bytes", share));
+  let file = content;
+  if (await isFbx(name, content)) {
+    say(tell, "convert");
+    const { convert } = await loadPart(import("../fbx"));
+    const { glb, notices } = await convert(name, await readBytes(name, content));
+    lost.push(...notices);
+    file = new Blob([glb as BlobPart]);
+  }
+  const bytes = await toWasm(pkg, name, file, (share) => say(tell, "bytes", share));
   say(tell, "geometry");
   return pkg.LoadedModel.read(name, bytes, siblingOf(siblings));
+}
+
+/** Whether a file is an FBX: the module converts it before it reads it. */
+async function isFbx(name: string, content: Blob): Promise<boolean> {
+  const start = new TextDecoder().decode(await readBytes(name, content.slice(0, FBX_BINARY.length)));
+  return start === FBX_BINARY || (extension(name) === "fbx" && !start.startsWith("glTF"));
 }

@@ -102,6 +102,7 @@ export const opening = {
   repairing: "Repairing the cage",
   stages: {
     bytes: "Reading the file",
+    convert: "Converting",
     geometry: "Finding vertices and faces",
     textures: "Decoding textures",
     check: "Checking the cage",
@@ -119,7 +120,7 @@ export const opening = {
   get kinds() {
     return `Cagework opens ${endings("conjunction")} files.`;
   },
-  companions: "These files belong to a .gltf, .obj or meta.json file. Open that file together with them.",
+  companions: "These files belong to a .gltf, .fbx, .obj or meta.json file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
     const what =

@@ -1,0 +1,102 @@
+//! FBX files, whose expected positions follow from the file by formula.
+
+use cagework_io::{Model, ModelFormat};
+use glam::{Mat3, Vec3};
+
+use crate::common::fbx::{BOX, Item, binary, corners, placed, rigged, text};
+use crate::common::{PNG, json_of, read, volume};
+
+/// A point of an FBX file, centimetres with z up, in metres with y up.
+fn metres([x, y, z]: [f32; 3]) -> Vec3 {
+    Vec3::new(x, z, -y) / 100.0
+}
+
+/// The corner of the box at `point`, both in metres.
+fn corner_at(point: Vec3, placed: impl Fn([f32; 3]) -> [f32; 3]) -> usize {
+    let at = |corner: &[f64; 3]| metres(placed(corner.map(|x| x as f32)));
+    corners().iter().position(|corner| at(corner).distance(point) < 1e-6).expect("it is a corner of the box")
+}
+
+fn file(items: &[Item]) -> Model {
+    read("box.fbx", &binary(items)).unwrap()
+}
+
+#[test]
+fn pivots_units_and_axes_place_a_mesh() {
+    let model = file(&placed());
+    // Translation, pre-rotation of 90 degrees about z, geometric translation.
+    let place = |[x, y, z]: [f32; 3]| [10.0 - y, 20.0 + x, 30.0 + z + 5.0];
+    let found: Vec<usize> = model.positions.iter().map(|&p| corner_at(p, place)).collect();
+    assert!((0..8).all(|corner| found.contains(&corner)), "{found:?}");
+    assert_eq!((model.triangles.len(), model.counts.primitives, model.counts.materials), (12, 2, 2));
+    let size = BOX[0] * BOX[1] * BOX[2] / 1e6;
+    assert!((f64::from(volume(&model)) - size).abs() < 1e-5, "{}", volume(&model));
+    assert_eq!(model.format(), ModelFormat::Gltf);
+}
+
+#[test]
+fn text_and_binary_are_the_same_model() {
+    for items in [placed(), rigged()] {
+        let [a, b] = [text(&items), binary(&items)].map(|bytes| read("x", &bytes).unwrap());
+        assert_eq!(a.write_glb(&a.positions), b.write_glb(&b.positions));
+    }
+}
+
+#[test]
+fn textures_are_looked_for_beside_the_file() {
+    let missing = file(&placed());
+    let notice = "texture 'wood grain.png' is missing: exports keep the reference";
+    assert!(missing.notices.iter().any(|found| found == notice), "{:?}", missing.notices);
+    let mut asked = Vec::new();
+    let mut beside = |name: &str| {
+        asked.push(name.to_owned());
+        Some(Ok(PNG.to_vec()))
+    };
+    let model = Model::read("box.fbx", &binary(&placed()), &mut beside).unwrap();
+    assert_eq!(asked, ["wood grain.png"]);
+    let json = json_of(&model.write_glb(&model.positions).unwrap());
+    assert_eq!(json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"]["index"], 0);
+    assert_eq!(json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][0], 1.0);
+}
+
+/// The clip turns the upper corners about x by 90 degrees per second, and moves corner 0 by 8 cm in a second.
+#[test]
+fn skins_shapes_and_clips_move_as_in_the_file() {
+    let model = file(&rigged());
+    assert!(model.is_rigged());
+    let clips = model.clips();
+    assert_eq!(clips.iter().map(|clip| clip.name.as_deref()).collect::<Vec<_>>(), [Some("bend")]);
+    let middle = Vec3::Z * (BOX[2] / 2.0) as f32;
+    let times = [0.0, 0.25, 1.0];
+    for (seconds, frame) in times.into_iter().zip(model.frames_at(0, &times).unwrap()) {
+        let turn = Mat3::from_rotation_x(seconds * std::f32::consts::FRAC_PI_2);
+        for (v, &moved) in frame.iter().enumerate() {
+            let corner = corner_at(model.positions[v], |p| p);
+            let rest = Vec3::from_array(corners()[corner].map(|x| x as f32));
+            let expected = match corner {
+                0 => rest - seconds * 8.0 * Vec3::X,
+                1..=3 => rest,
+                _ => middle + turn * (rest - middle),
+            };
+            let expected = metres(expected.to_array());
+            assert!(
+                expected.distance(moved) < 1e-5,
+                "corner {corner} at {seconds} s: {moved}, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn damaged_and_large_files_are_errors() {
+    let whole = binary(&rigged());
+    for length in [30, 200, whole.len() / 2] {
+        let message = read("box.fbx", &whole[..length]).unwrap_err().to_string();
+        assert!(message.starts_with("box.fbx: not readable as FBX: "), "{message}");
+        assert!(message.ends_with("Export it again, as FBX 7.4 or newer"), "{message}");
+    }
+    let small = Model::read_within("box.fbx", &whole, &mut |_| None, 100_000).unwrap_err().to_string();
+    assert!(small.contains("its contents need more than the limit of"), "{small}");
+    let none = read("box.fbx", b"; FBX 7.4.0 project file\nObjects: {\n}\n").unwrap_err().to_string();
+    assert!(none.contains("it has no triangles"), "{none}");
+}
