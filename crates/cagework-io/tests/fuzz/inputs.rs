@@ -383,7 +383,7 @@ fn odd_sog(file: Index, damage: &[Damage], changes: Vec<(Index, Value)>) -> Vec<
     for k in 0..archive.len() {
         let (mut entry, mut bytes) = (archive.by_index(k).expect("the sample is valid"), Vec::new());
         entry.read_to_end(&mut bytes).expect("the sample is valid");
-        files.push((entry.name().to_owned(), bytes));
+        files.push((entry.name().expect("it is UTF-8").into_owned(), bytes));
     }
     let n = files.len();
     let (name, bytes) = &mut files[file.index(n)];
@@ -393,8 +393,9 @@ fn odd_sog(file: Index, damage: &[Damage], changes: Vec<(Index, Value)>) -> Vec<
         let codebooks = ["scales", "sh0", "shN"].map(|name| json[name]["codebook"].take());
         change(&mut json, changes);
         for (name, codebook) in ["scales", "sh0", "shN"].into_iter().zip(codebooks) {
-            let part = json.get_mut(name).and_then(Value::as_object_mut);
-            part.map(|part| part.entry("codebook").and_modify(|of| *of = codebook));
+            if let Some(of) = json.get_mut(name).and_then(|part| part.get_mut("codebook")) {
+                *of = codebook;
+            }
         }
         *bytes = json.to_string().into_bytes();
     } else {
