@@ -144,7 +144,9 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     const cards = page.locator("li.pose");
     const names = () =>
-      cards.locator("input.pose-name").evaluateAll((all: HTMLInputElement[]) => all.map((one) => one.value));
+      cards
+        .locator("textarea.pose-name")
+        .evaluateAll((all: HTMLTextAreaElement[]) => all.map((one) => one.value));
     for (let count = 1; count <= 4; count++) {
       await page.getByRole("button", { name: "Save pose" }).first().click();
       await expect(cards).toHaveCount(count);

@@ -163,7 +163,7 @@ function Poses({ app }: { app: App }) {
   );
 }
 
-const NAME_FIELD = { class: "pose-name", type: "text", maxLength: 60 };
+const NAME_FIELD = { class: "pose-name", rows: 1, maxLength: 60 };
 
 interface PoseCardProps {
   app: App;
@@ -205,7 +205,9 @@ function PoseCard({ app, pose, index, isCurrent }: PoseCardProps) {
         {picture ? <img src={picture} alt="" width="112" height="84" /> : <Icon name="pose" />}
         {isModified && <span class="badge warn">{T.pose.modified}</span>}
       </button>
+      {/* Unlike an input, a textarea wraps a long name. */}
       <TextEntry
+        wraps
         name={T.pose.nameOf(name)}
         text={name}
         parse={String}
