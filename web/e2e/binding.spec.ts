@@ -1,7 +1,7 @@
 /** Binds run in the background: during a bind, the page draws frames, shows progress, and can cancel the bind. */
 
 import { BIND_DEFAULTS } from "../src/defaults";
-import { bound, dropBox, expect, hears, open, shoot, test } from "./support";
+import { bound, dropBox, expect, hears, open, shoot, test, unfold } from "./support";
 
 test("frames are drawn during a bind at g = 64", async ({ page }) => {
   // Drawing and the bind share one software GPU: in a small window, drawing takes little of its time.
@@ -28,10 +28,17 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
 }, async ({ page }) => {
   await open(page);
   await page.getByRole("button", { name: /bind/i }).first().click();
-  const grid = (cells: string) => page.locator("#panel").getByRole("radio", { name: cells, exact: true });
+  const fineness = page.getByRole("slider", { name: "Fineness" });
+
+  await test.step("the panel says first what the bind has done, and shows a weight", async () => {
+    await expect(page.getByText(/^Bound in .* At rest nothing moves\.$/)).toBeVisible();
+    await expect(page.locator(".weight-picture")).toBeVisible();
+    await expect(page.getByRole("button", { name: "Published" })).toBeHidden();
+    await unfold(page);
+  });
 
   await test.step("the panel compares the paper's method with the default", async () => {
-    await grid("32").check({ force: true });
+    await fineness.fill("1");
     await page.getByRole("button", { name: "Published" }).click();
     await page.keyboard.press("Control+Enter");
     await bound(page);
@@ -46,12 +53,12 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
   });
 
   await test.step("a cancelled bind keeps the previous one and marks the new settings", async () => {
-    await grid("128").check({ force: true });
+    await fineness.fill("3");
     await page.keyboard.press("Control+Enter");
     await expect(page.locator(".plot polyline"), "the chart shows this bind only").toHaveCount(1);
     await page.getByRole("button", { name: "Cancel" }).click();
     await hears(page, "Cancelled. The previous bind is still active.");
-    await expect(grid("128")).toBeChecked();
+    await expect(fineness).toHaveValue("3");
     await expect(page.getByText("Not applied yet: bind again to use these settings.")).toBeVisible();
     await bound(page);
   });

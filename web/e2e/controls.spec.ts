@@ -17,6 +17,7 @@ import {
   restPositions,
   shoot,
   test,
+  unfold,
 } from "./support";
 
 /** Writes a box centred at (0.15, 1, 0) as OBJ. The smooth surface of the box encloses the worm too. */
@@ -83,6 +84,7 @@ test("a smooth cage and inner controls are bound, posed, undone and saved", asyn
   });
 
   await test.step("clicks place a point and a bone", async () => {
+    await unfold(page);
     await page.getByRole("button", { name: "Point", exact: true }).click();
     await click(page, axis(0.3));
     await boundTo(page, 0, 1);

@@ -140,44 +140,60 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
     expect((await download).suggestedFilename()).toBe("cube-posed.glb");
   });
 
-  await test.step("poses are saved in view, ordered by keyboard and pointer, and have their own motion", async () => {
+  await test.step("poses are saved in view, ordered in strip and timeline, and have their own motion", async () => {
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     const cards = page.locator("li.pose");
     const names = () =>
-      cards.locator("textarea").evaluateAll((all: HTMLTextAreaElement[]) => all.map((one) => one.value));
-    for (let count = 1; count <= 5; count++) {
+      cards
+        .locator("textarea.pose-name")
+        .evaluateAll((all: HTMLTextAreaElement[]) => all.map((one) => one.value));
+    for (let count = 1; count <= 4; count++) {
       await page.getByRole("button", { name: "Save pose" }).first().click();
       await expect(cards).toHaveCount(count);
     }
     await expect(cards.last()).toBeInViewport({ ratio: 0.9 });
-    const [a = "", b = "", c = "", d = "", e = ""] = await names();
+    await expect(cards.locator("img")).toHaveCount(4);
+    const [a = "", b = "", c = "", d = ""] = await names();
     await cards
       .last()
-      .getByRole("button", { name: /^Move / })
-      .press("Alt+ArrowUp");
-    await expect.poll(names).toEqual([a, b, c, e, d]);
-    const [from, to] = await Promise.all(
-      [cards.nth(3).getByRole("button", { name: /^Move / }), cards.nth(2)].map((place) =>
-        place.boundingBox(),
-      ),
+      .getByRole("button", { name: `Show ${d}` })
+      .press("Alt+ArrowLeft");
+    await expect.poll(names).toEqual([a, b, d, c]);
+    await page.keyboard.press("Control+z");
+    await expect.poll(names).toEqual([a, b, c, d]);
+
+    const timeline = page.getByRole("region", { name: "Timeline" });
+    const key = (name: string) => timeline.getByRole("button", { name: `${name} at` });
+    await key(d).click();
+    await expect(cards.last().getByRole("button", { name: `Show ${d}` })).toHaveAttribute(
+      "aria-pressed",
+      "true",
     );
+    // The last pose, at 4 s, is dragged before the first one, at 1 s.
+    const [from, first] = await Promise.all([key(d), key(a)].map((place) => place.boundingBox()));
     await page.mouse.move((from?.x ?? 0) + 8, (from?.y ?? 0) + 8);
     await page.mouse.down();
-    await page.mouse.move((from?.x ?? 0) + 8, (to?.y ?? 0) + 12, { steps: 4 });
+    await page.mouse.move((first?.x ?? 0) - 24, (from?.y ?? 0) + 8, { steps: 4 });
     await page.mouse.up();
-    await expect.poll(names).toEqual([a, b, e, c, d]);
-    const motion = cards.nth(2).getByRole("combobox", { name: `Motion to ${e}` });
+    await expect.poll(names).toEqual([d, a, b, c]);
+    await shoot(page, "timeline");
+    await timeline.getByRole("button", { name: "Speed, name and motion" }).click();
+    await key(a).click();
+    const motion = timeline.getByRole("combobox", { name: `Motion to ${a}` });
     await motion.selectOption("Jump");
-    await shoot(page, "poses");
     await page.keyboard.press("Control+z");
     await expect(motion).toHaveValue("");
-    // The last pose becomes the first one. The field that has the focus shows the time of the pose that is now last.
-    const times = page.getByRole("spinbutton", { name: /^Time of / });
-    await times.last().fill("0.5");
-    await times.last().press("Enter");
-    await expect.poll(names).toEqual([d, a, b, e, c]);
-    await expect(times.first()).toHaveValue("0.5");
-    await expect(times.last()).toHaveValue("4");
+    const time = timeline.getByRole("spinbutton", { name: `Time of ${a}` });
+    const before = Number(await time.inputValue());
+    await key(a).press("ArrowRight");
+    await expect(time).toHaveValue(String(Number((before + 0.05).toFixed(3))));
+  });
+
+  await test.step("the playhead shows each time of the animation, and its pose is kept", async () => {
+    const playhead = page.getByRole("slider", { name: "Playhead" });
+    await playhead.press("Home");
+    await playhead.press("ArrowRight");
+    await expect(page.getByRole("button", { name: /^Undo/ })).toHaveAttribute("data-tip", /playhead/);
   });
 
   await test.step("a higher closeness lets the cage follow the model more closely", async () => {

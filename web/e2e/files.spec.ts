@@ -16,6 +16,7 @@ import {
   openWith,
   shoot,
   test,
+  unfold,
 } from "./support";
 
 test("good files get a cage and can be dragged, bad files leave the model open and report the cause", {
@@ -152,6 +153,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   await drag(page, 30, -20);
   const lying = await cagePositions(page);
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await unfold(page);
   const choice = page.getByRole("group", { name: "Up axis" });
   await choice.getByRole("radio", { name: "Z" }).click();
   // The model turns by -90 degrees about x.

@@ -14,6 +14,7 @@ import {
   openWith,
   shoot,
   test,
+  unfold,
 } from "./support";
 
 const heightOf = (positions: ArrayLike<number>) => {
@@ -55,11 +56,16 @@ test("a humanoid gets longer legs and a bigger head in six steps", async ({ page
     await page.getByRole("button", { name: "Chibi" }).click();
     await expect(page.getByRole("button", { name: "Chibi" })).toHaveAttribute("aria-pressed", "true");
     await expect(slider(page, "Legs")).toHaveValue("0.65");
+    await unfold(page);
     await page.getByRole("switch", { name: "Left and right apart" }).click();
     await slider(page, "Legs, left").fill("0.9");
     await expect(slider(page, "Legs, right")).toHaveValue("0.65");
     await page.getByRole("switch", { name: "Left and right apart" }).click();
     await expect(slider(page, "Legs")).toHaveValue("0.9");
+    const typed = page.getByRole("spinbutton", { name: "Legs, percent" });
+    await typed.fill("120");
+    await typed.press("Enter");
+    await expect(slider(page, "Legs")).toHaveValue("1.2");
     await slider(page, "Legs").dblclick();
     await expect(slider(page, "Legs")).toHaveValue("1");
     await page.getByRole("button", { name: "Reset all" }).click();
@@ -68,7 +74,7 @@ test("a humanoid gets longer legs and a bigger head in six steps", async ({ page
   });
 
   await test.step("the bones are listed and can be changed", async () => {
-    await page.getByText("Bones", { exact: true }).click();
+    await unfold(page);
     const chest = page.getByRole("combobox", { name: "Chest", exact: true });
     await expect(page.getByRole("combobox", { name: "Left thigh" })).toHaveValue("thigh.L");
     await chest.selectOption("spine");

@@ -12,6 +12,7 @@ import {
   rested,
   shoot,
   test,
+  unfold,
 } from "./support";
 
 test("points of the model are pulled and pinned", { tag: "@story" }, async ({ page }) => {
@@ -59,6 +60,7 @@ test("points of the model are pulled and pinned", { tag: "@story" }, async ({ pa
     await page.keyboard.up("Shift");
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     await expect(page.getByText("1 pin on the model")).toBeVisible();
+    await unfold(page);
     await page.getByText("The whole model follows").click();
     const at = await grip(page, [0.35, 0.45]);
     await pull(page, at, -30, -40);

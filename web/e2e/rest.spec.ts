@@ -19,6 +19,7 @@ import {
   shoot,
   spot,
   test,
+  unfold,
 } from "./support";
 
 /** Clicks the middle of an edge (`size` 2) or quad (4) that is visible; returns the indices of its corners. */
@@ -177,7 +178,8 @@ test("an edited cage is bound completely, on the chosen back end", async ({ page
   await page.keyboard.press("Tab");
   await expect(page.locator("#stage")).toHaveAttribute("data-rest", "");
   await page.getByRole("button", { name: "Bind" }).first().click();
-  await page.locator("#panel").getByRole("radio", { name: "32", exact: true }).check({ force: true });
+  await unfold(page);
+  await page.getByRole("slider", { name: "Fineness" }).fill("1");
   const card = page.getByRole("region", { name: "Result of the bind" });
   const move = async (way: number) => {
     for (const key of ["g", "y"]) await page.keyboard.press(key);

@@ -24,6 +24,7 @@ import {
   rested,
   shoot,
   test,
+  unfold,
 } from "./support";
 
 const TIMES = [0, 0.6, 1.3];
@@ -86,7 +87,7 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
     await shoot(page, "clip");
     await page.keyboard.press("Shift+J");
     await expect(page.getByRole("button", { name: "Play the clip" })).toBeVisible();
-    await page.getByRole("slider", { name: "Time" }).fill("0.6");
+    await page.getByRole("slider", { name: "Playhead" }).fill("0.6");
     const at = await page.evaluate(() => [...(globalThis.cagework?.engine.clipPositions() ?? [])]);
     expect(largestMove(at, rest[1] ?? [])).toBeLessThan(1e-5);
     expect(largestMove(at, rest[0] ?? []), "the legs swing").toBeGreaterThan(0.1);
@@ -116,12 +117,14 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
   await test.step("joints are drawn", async () => {
     const picture = () => drawing(page);
     const without = await picture();
+    await page.keyboard.press("n");
     const joints = page.getByRole("switch", { name: "Show joints" });
     await joints.click();
     await expect.poll(async () => without.equals(await picture())).toBe(false);
     await shoot(page, "joints");
     await joints.click();
     await expect.poll(async () => without.equals(await picture())).toBe(true);
+    await page.keyboard.press("n");
   });
 
   await test.step("the cage poses a paused frame, which is exported as it is shown", async () => {
@@ -144,14 +147,15 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
 
   await test.step("the cage bends the moving model, also while it is paused, and the export shows the same", async () => {
     const [plain = []] = await played(page, [1]);
-    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    await page.getByRole("button", { name: "Export", exact: false }).first().click();
+    await unfold(page);
     await page.getByRole("switch", { name: "The cage bends the moving model" }).click();
     await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
     await expect(page.getByRole("button", { name: "Pause the clip" })).toBeVisible();
     await shoot(page, "clip-bent");
     await page.keyboard.press("Shift+J");
     await expect(page.getByRole("button", { name: "Play the clip" })).toBeVisible();
-    await page.getByRole("slider", { name: "Time" }).fill("1");
+    await page.getByRole("slider", { name: "Playhead" }).fill("1");
     const shown = await shownFrame(page);
     expect(largestMove(shown, plain)).toBeGreaterThan(0.01);
     await dragsFrame(page, 1);
@@ -188,15 +192,13 @@ test("a model with several meshes, morph targets and a clip is the same after po
   expect(largestMove(cage, await cagePositions(page))).toBeGreaterThan(0.01);
   const shaped = await played(page, [0, 0.3, 0.5]);
   expect(largestMove(shaped[1] ?? [], before[1] ?? [])).toBeGreaterThan(0.01);
-  await page.getByRole("button", { name: "Pose", exact: false }).first().click();
-  await page.getByText("Parts that keep their shape (0 of 1)").click();
+  await page.getByRole("button", { name: "Export", exact: false }).first().click();
+  await unfold(page);
   await page.getByRole("switch", { name: "buckle" }).click();
   const rigid = await download(page, "glb");
   expect(await validationErrors(rigid.bytes)).toEqual([]);
   const buckle = await positionsOf(dropped.bytes, "buckle");
   expect(await positionsOf(rigid.bytes, "buckle"), "as it was, in its own space").toEqual(buckle);
-  await page.getByRole("button", { name: "Pose", exact: false }).first().click();
-  await page.getByText("Parts that keep their shape (1 of 1)").click();
   await page.getByRole("switch", { name: "buckle" }).click();
   await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
   await shoot(page, "dancer");

@@ -49,7 +49,7 @@ test("poses of a capture are blended and kept by a project and a reload, and its
   await test.step("a saved pose is blended with the rest pose", async () => {
     await pull(page, await grip(page, [0.5, 0.3]), 90, 10);
     await rested(page);
-    await page.getByRole("button", { name: "Save this pose" }).click();
+    await page.getByRole("button", { name: "Save pose" }).click();
     posed = await squares(page);
     expect(difference(rest, posed), "the pull is visible").toBeGreaterThan(40);
     await blend.fill("0");

@@ -397,9 +397,17 @@ export async function shoot(page: Page, name: string): Promise<void> {
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }
 
+/** Opens all folds of the panel. */
+export async function unfold(page: Page): Promise<void> {
+  await page.locator("#panel details").evaluateAll((folds: HTMLDetailsElement[]) => {
+    for (const fold of folds) fold.open = true;
+  });
+}
+
 /** Clicks the export button of the given kind; returns the downloaded file. */
 export async function download(page: Page, kind: string): Promise<DroppedFile> {
   await page.getByRole("button", { name: "Export", exact: false }).first().click();
+  await unfold(page);
   const [file] = await Promise.all([
     page.waitForEvent("download"),
     page.locator(`button[data-kind="${kind}"]`).click(),

@@ -195,7 +195,7 @@ test("the sheet and its panels at every height", async ({ page }) => {
     const name = page.getByRole("textbox", { name: /^Name of/ }).first();
     await name.fill("Stretching to the left with both arms above the head");
     // The focus has started the drawing of pictures, each of which draws the list again.
-    await expect(page.locator("img.pose-picture")).toHaveCount(await page.locator("li.pose").count());
+    await expect(page.locator(".pose-picture img")).toHaveCount(await page.locator("li.pose").count());
     await name.press("Enter");
     await expect(name).not.toBeFocused();
     const hidden = await name.evaluate((area) => [

@@ -15,7 +15,7 @@ import {
   showsColours,
   survives,
 } from "./stories";
-import { bound, drop, expect, grip, open, shoot, test } from "./support";
+import { bound, drop, expect, grip, open, shoot, test, unfold } from "./support";
 
 test.use({ launchOptions: WEBGL_LAUNCH });
 
@@ -101,6 +101,7 @@ test("without WebGPU the page exports, plays, and recovers from a lost context",
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const { x, y } = await grip(page);
     await page.getByRole("switch", { name: /Smooth its surface/ }).click();
+    await unfold(page);
     await page.getByRole("button", { name: "Point", exact: true }).click();
     await page.mouse.click(x, y);
     await expect

@@ -10,6 +10,7 @@ import type {
   SceneOptions,
 } from "./contract";
 import { SHAPE_FORMATS, SPLAT_FORMATS } from "./defaults";
+import { exportStem } from "./format";
 import type { AppState, CageSettings, ShapeFormat } from "./state";
 
 /** The rig options that apply to the open model. */
@@ -47,6 +48,7 @@ export function drawn(state: AppState): SceneOptions {
     ...scene,
     problems: scene.problems && (step === "cage" || cageBroken(state)),
     joints: scene.joints && rigOptions.joints,
+    ground: rigOf(state).ground,
   };
 }
 
@@ -112,6 +114,27 @@ export function asksToPull(state: AppState): boolean {
 /** Saved poses that fit the current cage. */
 export function fittingPoses(state: AppState): readonly PoseView[] {
   return state.poses.filter((pose) => pose.fits);
+}
+
+/** Whether there is an animation of saved poses that the exported GLB can contain. */
+export function hasAnimation(state: AppState): boolean {
+  return fittingPoses(state).length > 1 && !isCapture(state.model) && !rigOf(state).dynamic;
+}
+
+/** Whether the exported GLB contains the animation of the saved poses. */
+export function exportsAnimation(state: AppState): boolean {
+  return state.withAnimation && hasAnimation(state);
+}
+
+/** Name of the animation of the saved poses in exported files. */
+export function animationName({ transition, model }: AppState): string {
+  return transition.name || exportStem(model?.name ?? "");
+}
+
+/** Index of the saved pose that the current pose is, or was before it was changed; undefined for a blend of several. */
+export function currentPose({ shares }: AppState): number | undefined {
+  const [only, ...others] = [...shares.keys()].filter((k) => shares[k] !== 0);
+  return others.length === 0 && only !== undefined && shares[only] === 1 ? only : undefined;
 }
 
 /** Kind of element that clicks select. In pull mode these are vertices, unless the cage is being reshaped. */

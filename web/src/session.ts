@@ -409,6 +409,10 @@ async function start(opened: OpenResult & Needs) {
     async posePicture(width: number, height: number, index: number) {
       return pngOf(await engine.posePicture(width, height, index), width, height);
     },
+    /** Draws the model with the colours of the weight of a control as a PNG, on a transparent background. */
+    async weightPicture(width: number, height: number, column: number) {
+      return pngOf(await engine.weightPicture(width, height, column), width, height);
+    },
     /** For tests: reads the posed positions as drawn, by default with harmonic coordinates. */
     readPositions: (kind: Coordinates = "harmonic") => engine.readPositions(kind),
     /** Calls `listener` when the GPU device is lost, after which the page calls `recover()`. */

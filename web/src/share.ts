@@ -1,4 +1,4 @@
-/** Share links: sample, pose and view in the URL's fragment, which browsers do not send to the server. */
+/** Links: sample, pose and view, or a stop of the tour, in the URL's fragment, which browsers do not send to servers. */
 
 import type { CageControls, CameraView, SceneOptions } from "./contract";
 import { PageError } from "./strings";
@@ -117,3 +117,12 @@ export function fromBase64Url(text: string): Uint8Array {
   const binary = atob(text.replaceAll("-", "+").replaceAll("_", "/"));
   return Uint8Array.from(binary, (letter) => letter.charCodeAt(0));
 }
+
+/** Returns the stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
+export function stopOf(fragment: string): number | undefined {
+  const said = new URLSearchParams(fragment.slice(1)).get("tour");
+  return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);
+}
+
+/** Returns the fragment of a link to a stop of the tour, counted from 0. */
+export const linkOf = (stop: number): string => `#tour=${stop + 1}`;

@@ -3,14 +3,13 @@
 import { isSoftware } from "@cagework/core/session/adapter";
 import { effect, untracked } from "@preact/signals";
 import { report } from "./actions/context";
-import { stopOf } from "./actions/tour";
 import { isComparison } from "./actions/view";
 import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
 import { COORDINATES } from "./defaults";
 import { percent } from "./format";
 import type { OfflineCopy } from "./offline/keep";
-import { decodeShare } from "./share";
+import { decodeShare, stopOf } from "./share";
 import { loadTheme } from "./store";
 import { PageError } from "./strings";
 import { coveredIn } from "./ui/covered";

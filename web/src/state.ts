@@ -121,6 +121,8 @@ export const MODEL_STATE = {
   memory: 0 as number | Message,
   slice: { axis: 2, position: 0.5, busy: false } as Slice,
   boxArmed: false,
+  /** Whether the pointer is over a handle that has no mirror image, while editing is symmetric. */
+  hoversAlone: false,
   /** Kind of inner control that clicks add; null for none. */
   placing: null as InnerKind | null,
   ortho: false,
@@ -131,6 +133,10 @@ export const MODEL_STATE = {
   /** Whether pulls move the whole model. */
   pullWhole: false,
   playing: false,
+  /** Position of the playhead in the animation of the cage, seconds. */
+  moment: 0,
+  /** Whether the exported GLB contains the animation of the saved poses. */
+  withAnimation: true,
   /** The rig whose clips the cage follows; null without one. */
   walk: null as WalkState | null,
   /** Whether the left and right parts of a humanoid have sliders of their own. */

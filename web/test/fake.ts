@@ -261,6 +261,8 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
+    movesAlone: () => false,
+    reachCircle: () => new Float32Array(),
     axes: () => Float32Array.of(0.8, -0.2, 0.5, 0, 0.9, 0.3, -0.5, -0.3, 0.8),
     estimateUpdates: () => 0,
     gestureView: () => ({ kind: "grab", amounts: [0.25], axis: 0, plane: false }),
@@ -294,6 +296,7 @@ export function createFake(): Fake {
     pullGrab: (grab) => job("pullGrab", grab),
     pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
+    weightPicture: (_width, _height, column) => job<Blob>("weightPicture", column).done,
     posePicture: (_width, _height, index) => job<Blob>("posePicture", index).done,
     onFrame: () => () => undefined,
     readSettings(text, memory_limit) {
@@ -319,6 +322,7 @@ export function createFake(): Fake {
           ...(fix ? { fix: fix.label as never } : {}),
         }),
       clear: () => problems.splice(0),
+      closeLatest: () => false,
     },
     fixFor: (fix) => ({ label: fix, run: () => undefined }),
   };

@@ -11,12 +11,12 @@ import { type AppState, INITIAL_STATE, type StepName } from "../src/state";
 import { explain, isCancelled, sentence, textOf } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
-import { verdict } from "../src/ui/report";
+import { sayResult } from "../src/ui/report";
 import { hintOf } from "../src/ui/status";
 import { placeTip } from "../src/ui/tips";
 import { nextTool } from "../src/ui/toolbar";
 import { recognise } from "../src/ui/unsupported";
-import { PLAIN_CONTROLS } from "./fake";
+import { PLAIN_CONTROLS, reportOf } from "./fake";
 
 describe("typed amounts", () => {
   const type = (keys: string) => [...keys].reduce((typed, key) => nextAmount(typed, key) ?? typed, "");
@@ -173,17 +173,20 @@ it("faults are marked in step Cage, and elsewhere if they prevent a bind", () =>
   expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);
 });
 
-describe("the verdict on a bind", () => {
-  const report = (max_rel: number) => ({
-    converged: true,
-    rest_error: { mean: 0, p99: 0, max: 0, mean_rel: 0, max_rel },
-  });
-  it("reports the error before the correction, not only after it", () => {
-    expect(verdict(report(1e-8))).toMatch(/weights are corrected .* The solver error is/);
-    expect(verdict(report(1e-2))).toBe(
-      "With the cage at rest, the model is off by up to 1 % of the cage's size.",
+it("the result of a bind says what follows what, and how far the model is off at rest", () => {
+  const said = (report: Partial<BindReport>) =>
+    sayResult(
+      reportOf({
+        vertices: 4812,
+        cage_vertices: 80,
+        timings_ms: { voxelize: 0, solve: 0, sample: 0, total: 200 },
+        ...report,
+      }),
     );
-  });
+  const error = (max_rel: number) => ({ ...reportOf({}).rest_error, max_rel });
+  expect(said({ rest_error: error(1e-8) })).toMatch(/4,812 points .* 80 handles .*At rest nothing moves\.$/);
+  expect(said({ rest_error: error(1e-2) })).toContain("off by up to 1% of the cage's size");
+  expect(said({ outside_vertices: 1, converged: false })).toMatch(/stopped .* 1 point lies outside/);
 });
 
 describe("words", () => {

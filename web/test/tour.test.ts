@@ -1,7 +1,7 @@
 import { expect, it, vi } from "vitest";
-import { stopOf } from "../src/actions/tour";
 import type { View } from "../src/actions/view";
 import type { BindOptions } from "../src/contract";
+import { stopOf } from "../src/share";
 import { createGuide, type GuideNeeds } from "../src/tour/guide";
 import { isOf, STOPS, type StopName } from "../src/tour/stops";
 import { cageOf, createFake, MODEL, reportOf, settled } from "./fake";

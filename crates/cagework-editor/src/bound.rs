@@ -170,6 +170,24 @@ impl<'a> BoundDocument<'a> {
         points.iter().filter_map(place).collect()
     }
 
+    /// Height by which exports with the option `ground` lift the models in the current pose at rest, object units.
+    ///
+    /// # Errors
+    /// If a rig cannot be read.
+    pub fn lift(&self) -> Result<f32, BoundError> {
+        let pose = &self.document().pose;
+        let (posed, mut all) = (self.deformed(pose)?, Ground::default());
+        for member in self.document().models.iter() {
+            all.add(if member.model.is_rigged() {
+                let by = MovedModel::new(*self, member.id, None).displacements(&member.model, pose)?;
+                member.model.ground_of_rig(&by, &member.parts()?)?
+            } else {
+                member.model.ground(member.share(&posed))
+            });
+        }
+        Ok(all.lift() as f32)
+    }
+
     /// Computes the field that deforms the splats of a capture; `None` at rest and without a lattice.
     #[must_use]
     pub fn field_of_splats(&self) -> Option<Field> {

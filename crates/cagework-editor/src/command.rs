@@ -598,6 +598,20 @@ impl Editor {
         Ok(())
     }
 
+    /// The faces whose corners are the mirror images of the corners of `faces`.
+    fn mirror_images(&self, faces: &[u32]) -> Vec<u32> {
+        let all = &self.topology().faces;
+        let image = |&face: &u32| {
+            let corners: Option<Vec<u32>> =
+                all[face as usize].iter().map(|&i| self.symmetry().partner(i)).collect();
+            let corners = corners?;
+            let is_image =
+                |face: &Vec<u32>| face.len() == corners.len() && face.iter().all(|i| corners.contains(i));
+            all.iter().position(is_image).map(|face| face as u32)
+        };
+        faces.iter().filter_map(image).collect()
+    }
+
     fn edited(&self, edit: RestEdit) -> Result<CageEdit, EditError> {
         let mesh = self.cage_as_shown();
         let topology = self.topology();
@@ -614,7 +628,8 @@ impl Editor {
             RestEdit::ExtrudeFace | RestEdit::DeleteFace if faces.is_empty() => return Err(face),
             RestEdit::ExtrudeFace => {
                 let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
-                extrude_faces(&mesh, &faces, distance)?
+                let images = if self.tools().symmetry { self.mirror_images(&faces) } else { Vec::new() };
+                extrude_faces(&mesh, &[faces, images].concat(), distance)?
             }
             RestEdit::DeleteFace => delete_faces(&mesh, &faces)?,
             RestEdit::DeleteVertex if self.selection.is_empty() => {

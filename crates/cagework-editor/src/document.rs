@@ -3,8 +3,9 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-use cagework_core::PolygonMesh;
+use cagework_core::{Bounds, PolygonMesh};
 use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline};
+use cagework_pose::blend::blend;
 use cagework_pose::proportions::Proportions;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,10 @@ use serde::{Deserialize, Serialize};
 use crate::controls::RestCage;
 use crate::models::Models;
 use crate::surface::SurfacePoint;
+
+/// Distance of cage vertices in two poses that count as equal, as a fraction of the cage's diagonal. It covers the
+/// rounding of blends to f32.
+const SAME_POSE: f32 = 1e-5;
 
 /// A saved pose of the cage.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,10 +38,13 @@ pub struct NamedPose {
     pub proportions: Proportions,
 }
 
-/// How the animation of the saved poses goes from one to the next, and how it ends.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Name of the animation of the saved poses, how it goes from one to the next, and how it ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Transition {
+    /// Name of the clip in exported files; empty if the user has not named it.
+    #[serde(default)]
+    pub name: String,
     /// Interpolation towards poses that have none of their own, and of the return to the start.
     pub interpolation: Interpolation,
     /// Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
@@ -47,7 +55,8 @@ pub struct Transition {
 
 impl Default for Transition {
     fn default() -> Self {
-        Self { interpolation: Interpolation::Linear, loops: true, back: SECONDS_PER_POSE }
+        let (name, interpolation) = (String::new(), Interpolation::Linear);
+        Self { name, interpolation, loops: true, back: SECONDS_PER_POSE }
     }
 }
 
@@ -130,6 +139,23 @@ impl Document {
         *self.pose != *self.cage.mesh.positions
     }
 
+    /// Whether the pose differs from the blend of the saved poses by `shares`. False without shares.
+    #[must_use]
+    pub fn is_modified(&self) -> bool {
+        let (poses, shares): (Vec<Vec<Vec3>>, Vec<f32>) = self
+            .poses
+            .iter()
+            .zip(&*self.shares)
+            .filter(|(pose, share)| self.fits(pose) && **share != 0.0)
+            .map(|(pose, share)| (pose.positions.to_vec(), *share))
+            .unzip();
+        let rest = &self.cage.mesh.positions;
+        let tolerance = SAME_POSE * Bounds::around(rest).map_or(0.0, |bounds| bounds.diagonal());
+        let is_far = |(own, of): (&Vec3, &Vec3)| own.distance(*of) > tolerance;
+        !poses.is_empty()
+            && blend(rest, &poses, &shares).is_ok_and(|blended| self.pose.iter().zip(&blended).any(is_far))
+    }
+
     /// Whether a saved pose was saved for this cage. The number of its positions does not decide, because another cage
     /// can have as many vertices in another order.
     #[must_use]
@@ -161,12 +187,13 @@ impl Document {
     /// Timeline of the poses that [fit](Self::fits) the cage. The page plays it, and exports contain it.
     #[must_use]
     pub fn timeline(&self) -> Timeline {
-        let Transition { interpolation, loops, back } = self.transition;
+        let Transition { interpolation, loops, back, .. } = self.transition;
         let seconds = self.pose_seconds();
         // With very many poses, even one per second exceeds `MAX_SECONDS`, and `Timeline::new` rejects the times.
         let timeline = Timeline::new(&seconds, loops.then_some(back));
         let own: Vec<_> = self.fitting_poses().map(|pose| pose.interpolation).collect();
-        timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation).with_own(&own)
+        let timeline = timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len()));
+        timeline.with(interpolation).with_own(&own)
     }
 
     /// Whether a document and a later or earlier clone of it are equal. Compares meshes, cages and models by their

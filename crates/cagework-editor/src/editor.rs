@@ -445,7 +445,8 @@ impl Editor {
         self.humanoid.cage(&self.document)
     }
 
-    /// Moves the cage to its pose at a time of the animation of the saved poses, seconds.
+    /// Moves the cage to its pose at a time of the animation of the saved poses, seconds, and sets the shares of the
+    /// poses.
     pub fn play_at(&mut self, seconds: f32) {
         let poses: Vec<Vec<Vec3>> =
             self.document.fitting_poses().map(|pose| pose.positions.to_vec()).collect();
@@ -453,6 +454,14 @@ impl Editor {
         if let Ok(positions) = blend(&self.document.cage.mesh.positions, &poses, &shares) {
             // `blend` returns one position per control, so this cannot fail.
             let _ = self.set_pose(positions);
+            let Document { poses, .. } = &self.document;
+            let mut of_fitting = shares.iter();
+            let share = |pose| if self.document.fits(pose) { of_fitting.next().copied() } else { None };
+            let shares: Arc<[f32]> = poses.iter().map(share).map(Option::unwrap_or_default).collect();
+            let at = shares.iter().position(|&share| share == 1.0);
+            // The blend of factors is not the factor of the blend.
+            self.document.proportions = at.map(|k| poses[k].proportions).unwrap_or_default();
+            self.document.shares = shares;
         }
     }
 
@@ -484,13 +493,19 @@ impl Editor {
         self.walk().map_or_else(Vec::new, |walk| walk.joints.clone())
     }
 
+    /// Radius of proportional editing, object units; 0 while it is off.
+    #[must_use]
+    pub fn reach(&self) -> f32 {
+        let diagonal = Bounds::around(&self.document.cage.mesh.positions).map_or(0.0, |b| b.diagonal());
+        if self.tools.proportional_on { self.tools.proportional as f32 * diagonal } else { 0.0 }
+    }
+
     /// Share of the movement that each vertex makes in a gesture that starts at `positions`.
     #[must_use]
     pub fn pull(&self, positions: &[Vec3]) -> Pull {
         let rest = &self.document.cage.mesh.positions;
-        let diagonal = Bounds::around(rest).map_or(0.0, |b| b.diagonal());
         let symmetry = self.tools.symmetry.then_some(&self.symmetry);
-        let radius = if self.tools.proportional_on { self.tools.proportional as f32 * diagonal } else { 0.0 };
+        let radius = self.reach();
         Pull::new(&self.selection, positions, rest, SharedPull { radius, symmetry })
     }
 
@@ -614,7 +629,8 @@ impl Editor {
             cage_id: *cage_id,
             poses: poses.iter().map(pose_view).collect(),
             shares: shares.to_vec(),
-            transition: *transition,
+            modified: self.document.is_modified(),
+            transition: transition.clone(),
             animation_seconds: self.document.timeline().seconds(),
             pins: pins.to_vec(),
             posed: !self.editing_rest && self.document.is_posed(),

@@ -15,6 +15,9 @@ use crate::document::Document;
 use crate::options::RigOptions;
 use crate::playback::Playback;
 
+/// Name of the morph target that leads from the posed shape back to the shape at rest.
+const REST_NAME: &str = "Rest";
+
 /// A written file, and what the user should know about it.
 #[derive(Clone, Debug, Default)]
 pub struct Exported {
@@ -95,19 +98,36 @@ impl BoundDocument<'_> {
     }
 
     /// Exports a model as GLB with a morph target for each saved pose of the cage and the animation of the poses.
+    /// `in_pose`: the model has the shape of the current pose, and no expressions. Otherwise it stays at rest. `name`: name
+    /// of the animation.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn poses(&self, id: u32, request: &RigOptions) -> Result<Exported, BoundError> {
+    pub fn poses(
+        &self,
+        id: u32,
+        request: &RigOptions,
+        in_pose: bool,
+        name: &str,
+    ) -> Result<Exported, BoundError> {
         self.require_mesh()?;
-        let mut options = self.of_rig(self.rest(), request)?;
-        let is_vrm = self.document().models.get(id)?.model.vrm().is_some();
-        options.expressions = request.reshape.expressions && is_vrm && !request.plain;
-        let timeline = Some(self.document().timeline()).filter(|_| !options.expressions);
-        let all = self.document().fitting_poses();
-        let all =
-            all.map(|pose| NamedPose { name: pose.name.to_string(), positions: pose.positions.to_vec() });
-        let poses = Poses::Targets { all: all.collect(), timeline };
+        let document = self.document();
+        let mut options = self.of_rig(if in_pose { &document.pose } else { self.rest() }, request)?;
+        let is_vrm = document.models.get(id)?.model.vrm().is_some();
+        options.expressions = request.reshape.expressions && is_vrm && !request.plain && !in_pose;
+        let named = |name: &str, positions: &[Vec3]| NamedPose {
+            name: name.to_owned(),
+            positions: positions.to_vec(),
+        };
+        let mut all: Vec<NamedPose> =
+            document.fitting_poses().map(|pose| named(&pose.name, &pose.positions)).collect();
+        let mut timeline = document.timeline().named(name);
+        if in_pose && document.is_posed() && timeline.shows_rest() {
+            timeline = timeline.with_rest_as_pose();
+            all.push(named(REST_NAME, self.rest()));
+        }
+        let base = in_pose.then(|| document.pose.to_vec());
+        let poses = Poses::Targets { base, all, timeline: Some(timeline).filter(|_| !options.expressions) };
         let job = self.job(id, ModelFormat::Gltf, options, request.plain)?;
         Ok(job.write(job.deform(&MovedModel::new(*self, id, None), &poses)?)?.into())
     }

@@ -68,8 +68,10 @@ pub const BRUSH: Number = Number {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::SelectMode;
     use crate::edit::tests::{FrontView, cube};
-    use crate::{Command, Contents, Editor};
+    use crate::{Command, Contents, Editor, RestEdit};
+    use cagework_core::Bounds;
 
     #[test]
     fn tools_of_the_person_stay_when_a_model_opens_and_those_of_the_model_are_reset() {
@@ -99,6 +101,23 @@ mod tests {
         assert_eq!(editor.view().unmatched, 0);
         editor.set_tools(Tools { symmetry: true, ..Tools::default() }, &FrontView);
         assert_eq!(editor.view().unmatched, 2, "vertices 0 and 1 were images of each other");
+    }
+
+    #[test]
+    fn an_extrusion_with_symmetry_also_extrudes_the_mirror_image() {
+        let mut editor = Editor::default();
+        let mesh = cube();
+        let side: Vec<u32> = (0..8).filter(|&v| mesh.positions[v as usize].x == 0.0).collect();
+        editor
+            .apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new(), rings: Vec::new() })
+            .unwrap();
+        editor.set_editing_rest(true, "reset");
+        editor.set_tools(Tools { symmetry: true, element: Element::Face, ..Tools::default() }, &FrontView);
+        editor.selection.change(&side, SelectMode::Replace);
+        editor.apply(Command::EditRest { edit: RestEdit::ExtrudeFace }).unwrap();
+        // The cube's faces at x = 0 and x = 1 are mirror images.
+        let bounds = Bounds::around(&editor.document().cage.mesh.positions).unwrap();
+        assert!(bounds.min.x < 0.0 && (bounds.min.x + bounds.max.x - 1.0).abs() < 1e-6, "{bounds:?}");
     }
 
     #[test]

@@ -70,7 +70,7 @@ enum ModelMotion {
 impl ModelMotion {
     /// Prepares the motion of one model: the motion of its export or, with `dynamic`, of the original file, which the
     /// cage then deforms.
-    fn new(all: BoundDocument<'_>, id: u32, options: &RigOptions) -> Result<Self, BoundError> {
+    fn new(all: BoundDocument<'_>, id: u32, options: &RigOptions, lift: f32) -> Result<Self, BoundError> {
         let member = all.document().models.get(id)?;
         if member.model.format() == ModelFormat::Gltf && !options.dynamic {
             let glb = all.glb(id, options, None)?.bytes;
@@ -82,8 +82,8 @@ impl ModelMotion {
         // A model whose format has no clips has one shape: that of the cage's pose or, for `dynamic`, the rest shape,
         // which the field then deforms.
         let posed = all.deformed(if options.dynamic { all.rest() } else { &all.document().pose })?;
-        let own = member.share(&posed);
-        Ok(Self::Still(all.document().models.up().turned_back(own).into_owned()))
+        let own: Vec<Vec3> = member.share(&posed).iter().map(|p| *p + lift * Vec3::Y).collect();
+        Ok(Self::Still(all.document().models.up().turned_back(&own).into_owned()))
     }
 }
 
@@ -122,6 +122,8 @@ pub struct Playback {
     pub skin: Skin,
     /// Rotation from the axes of the files to the axes of the scene.
     up: Mat4,
+    /// Height by which the exported models are lifted at rest, object units.
+    lift: f32,
     /// Current joint matrices and target weights of each model.
     posed: Vec<RigPose>,
     /// Current weights of the morph targets of all models. `[n_targets]`
@@ -140,7 +142,8 @@ impl Playback {
     pub fn new(all: BoundDocument<'_>, options: RigOptions) -> Result<Self, BoundError> {
         let editor = all.editor;
         let field = if options.dynamic { Some(all.field()?) } else { None };
-        let motion = |id| Ok((id, ModelMotion::new(all, id, &options)?));
+        let lift = if options.reshape.ground && !options.dynamic { all.lift()? } else { 0.0 };
+        let motion = |id| Ok((id, ModelMotion::new(all, id, &options, lift)?));
         let ids = editor.document().models.iter().map(|member| member.id);
         let parts = ids.map(motion).collect::<Result<Vec<_>, BoundError>>()?;
         let models = &editor.document().models;
@@ -167,6 +170,7 @@ impl Playback {
             clips,
             skin,
             up,
+            lift,
             posed: Vec::new(),
             targets: Vec::new(),
             field,
@@ -226,10 +230,20 @@ impl Playback {
         self.is_new = true;
     }
 
-    /// Current matrices of the joints, in the axes of the scene.
+    /// Current matrices of the joints in the view, where the floor moves instead of the lifted models, so that models and
+    /// cage stay together.
     #[must_use]
     pub fn palette(&self) -> Vec<Mat4> {
-        self.posed.iter().flat_map(|posed| &posed.palette).map(|&m| self.up * m).collect()
+        self.palette_by(self.in_view())
+    }
+
+    fn palette_by(&self, turn: Mat4) -> Vec<Mat4> {
+        self.posed.iter().flat_map(|posed| &posed.palette).map(|&m| turn * m).collect()
+    }
+
+    /// From the axes of the files to the view.
+    fn in_view(&self) -> Mat4 {
+        Mat4::from_translation(-self.lift * Vec3::Y) * self.up
     }
 
     /// Current weights of the morph targets. `[n_targets]`
@@ -238,17 +252,17 @@ impl Playback {
         &self.targets
     }
 
-    /// Current position of a node of a model, in the axes of the scene; `None` if the node does not exist.
+    /// Current position of a node of a model in the view, like [`Self::palette`]; `None` if the node does not exist.
     #[must_use]
     pub fn origin(&self, id: u32, node: u32) -> Option<Vec3> {
         let place = self.played.iter().position(|one| one.id == id)?;
-        self.posed[place].origins.get(node as usize).map(|&p| self.up.transform_point3(p))
+        self.posed[place].origins.get(node as usize).map(|&p| self.in_view().transform_point3(p))
     }
 
-    /// Computes the current vertices on the CPU. `[n_vertices]`
+    /// Computes the current vertices of the exported models, in the axes of the scene. `[n_vertices]`
     #[must_use]
     pub fn positions(&self) -> Vec<Vec3> {
-        let mut positions = skin_vertices(&self.skin, &self.palette(), &self.targets);
+        let mut positions = skin_vertices(&self.skin, &self.palette_by(self.up), &self.targets);
         if let Some(field) = &self.field {
             bend_vertices(field, &mut positions);
         }

@@ -120,7 +120,7 @@ impl DocumentSettings {
                 .collect(),
             pins: pins.to_vec(),
             saved_poses,
-            transition: (*transition != Transition::default()).then_some(*transition),
+            transition: (*transition != Transition::default()).then(|| transition.clone()),
             models: models.settings(),
         }
     }

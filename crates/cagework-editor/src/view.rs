@@ -24,7 +24,9 @@ pub struct DocumentView {
     pub poses: Vec<PoseView>,
     /// Share of each saved pose in the current pose.
     pub shares: Vec<f32>,
-    /// How the animation of the saved poses goes from one to the next, and how it ends.
+    /// Whether the pose differs from the blend of the saved poses by `shares`.
+    pub modified: bool,
+    /// Name of the animation of the saved poses, how it goes from one to the next, and how it ends.
     pub transition: Transition,
     /// Length of the animation of the saved poses, seconds.
     pub animation_seconds: f32,

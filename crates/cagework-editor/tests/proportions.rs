@@ -6,12 +6,13 @@ use cagework_cage::samples;
 use cagework_core::bind::fineness::ROUGH_GRID;
 use cagework_core::deform::deform_bound;
 use cagework_core::progress::NoProgress;
+use cagework_core::skin::skin_vertices;
 use cagework_core::{BindOptions, Binding, bind, subdivided_box};
 use cagework_editor::{
     BoundDocument, BoundModels, Command, Contents, DocumentSettings, Editor, FoldSample, KnownGround,
-    PoseSettings,
+    Playback, PoseSettings, RigOptions,
 };
-use cagework_io::{Model, read_project, write_mesh_glb};
+use cagework_io::{Model, RigPose, read_project, write_mesh_glb};
 use cagework_pose::proportions::Proportion;
 use glam::Vec3;
 
@@ -263,8 +264,10 @@ fn a_joint_of_another_bone_is_exchanged_with_it() {
 fn bound(editor: &Editor) -> Arc<BoundModels> {
     let document = editor.document();
     let options = BindOptions { grid: ROUGH_GRID, ..BindOptions::default() };
-    let (positions, set) = (document.models.positions(), document.cage.set.as_ref().expect("valid input"));
-    let Binding { weights, frames, .. } = bind(positions, set, &options, &NoProgress).expect("valid input");
+    let points =
+        [document.models.positions(), &document.models.extra_points().expect("valid input")].concat();
+    let set = document.cage.set.as_ref().expect("valid input");
+    let Binding { weights, frames, .. } = bind(&points, set, &options, &NoProgress).expect("valid input");
     Arc::new(BoundModels::new(document, weights, frames, Vec::new()))
 }
 
@@ -337,4 +340,64 @@ fn a_cage_follows_the_clip_of_a_fitted_rig_until_the_cage_changes() {
     editor.apply(replace).unwrap();
     assert!(!editor.walk_at(0, 0.5) && editor.walk_joints().is_empty());
     assert!(editor.set_walk(&Model::read("statue.glb", &statue, &mut |_| None).unwrap()).is_err());
+}
+
+#[test]
+fn an_export_in_the_pose_plays_what_the_page_plays() {
+    let mut editor = opened(&GLB);
+    let bound = bound(&editor);
+    for (name, factor) in [("leg", 1.3), ("head", 1.5)] {
+        set(&mut editor, name, factor);
+        editor.apply(Command::SavePose { name: name.to_owned() }).unwrap();
+    }
+    set(&mut editor, "arm", 1.4);
+    editor.commit("Arms");
+    let ground = KnownGround::default();
+    let all =
+        |editor| BoundDocument { editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
+    let (id, options) = (editor.document().models.first().unwrap().id, RigOptions::default());
+    let read = |bytes: Vec<u8>| Model::read("a.glb", bytes, &mut |_| None).unwrap();
+    let posed = read(all(&editor).glb(id, &options, None).unwrap().bytes);
+    let animated = read(all(&editor).poses(id, &options, true, "Wave").unwrap().bytes);
+    assert_eq!(animated.positions, posed.positions);
+    let clip = animated.clips().iter().position(|clip| clip.name.as_deref() == Some("Wave")).unwrap();
+    let player = animated.player().unwrap().unwrap();
+    assert_eq!(player.targets().0, ["leg", "head", "Rest"]);
+    for seconds in [0.0, 0.5, 1.0, 1.7, 2.5] {
+        editor.play_at(seconds);
+        let RigPose { palette, targets, .. } = player.pose_at(Some(clip), seconds, &[]);
+        let exported = skin_vertices(&player.skin, &palette, &targets);
+        let shown = all(&editor).deformed(&editor.document().pose).unwrap();
+        let off = farthest(&exported, &shown);
+        assert!(off < 10.0 * ROUNDING, "{off} at {seconds} s");
+        let shares = editor.document().timeline().shares(seconds);
+        assert_eq!(editor.view().shares, shares);
+    }
+}
+
+/// The cage stretches the model by 1.3 along y and lowers it by 0.2.
+#[test]
+fn the_lift_of_the_view_is_that_of_exports_and_clips() {
+    let mut editor = opened(&GLB);
+    let bound = bound(&editor);
+    let stretched = |p: &Vec3| Vec3::new(p.x, 1.3 * p.y - 0.2, p.z);
+    let positions = editor.document().pose.iter().map(stretched).collect();
+    editor.apply(Command::SetPose { positions }).unwrap();
+    let ground = KnownGround::default();
+    let all =
+        BoundDocument { editor: &editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
+    let low = |all: &[Vec3]| all.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+    let models = &editor.document().models;
+    let (rest, posed) = (low(models.positions()), low(&all.deformed(&editor.document().pose).unwrap()));
+    let lift = all.lift().unwrap();
+    assert!((lift - (rest - posed)).abs() < 10.0 * ROUNDING, "{lift}");
+    let mut options = RigOptions::default();
+    options.reshape.ground = true;
+    let glb = all.glb(models.first().unwrap().id, &options, None).unwrap().bytes;
+    let exported = Model::read("a.glb", glb, &mut |_| None).unwrap();
+    assert!((low(&exported.positions) - rest).abs() < 10.0 * ROUNDING);
+    let playback = Playback::new(all, options).unwrap();
+    assert!((low(&playback.positions()) - rest).abs() < 10.0 * ROUNDING);
+    let in_view = skin_vertices(&playback.skin, &playback.palette(), playback.targets());
+    assert!((low(&in_view) - posed).abs() < 10.0 * ROUNDING, "where the cage is");
 }

@@ -124,7 +124,8 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     step(&mut editor, &mut documents, Command::UpdatePose { index: 1 });
     let document = editor.document();
     assert_eq!((&document.poses[1].positions, editor.view().shares), (&document.pose, vec![0.0, 1.0, 0.0]));
-    let transition = Transition { interpolation: Interpolation::Cubic, loops: true, back: 0.5 };
+    let name = "Wave".to_owned();
+    let transition = Transition { name, interpolation: Interpolation::Cubic, loops: true, back: 0.5 };
     step(&mut editor, &mut documents, Command::SetTransition { transition });
     assert_eq!(editor.view().animation_seconds, 2.5);
     let interpolation = Some(Interpolation::Step);
@@ -543,6 +544,27 @@ fn saved_poses_keep_their_displacements_when_the_cage_is_reshaped() {
     editor.commit("Reshape");
     assert!(editor.undo());
     assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, 8));
+}
+
+#[test]
+fn a_pose_is_modified_until_it_is_saved_again() {
+    let mut editor = opened_with_box();
+    let pull = |editor: &mut Editor| {
+        let positions = editor.document().pose.iter().map(|p| *p + Vec3::new(0.1, p.x, 0.0)).collect();
+        editor.apply(Command::SetPose { positions }).unwrap();
+        editor.commit("Pull");
+    };
+    pull(&mut editor);
+    assert!(!editor.view().modified, "no pose is saved");
+    editor.apply(Command::SavePose { name: "one".to_owned() }).unwrap();
+    assert!(!editor.view().modified);
+    pull(&mut editor);
+    assert!(editor.view().modified);
+    editor.apply(Command::UpdatePose { index: 0 }).unwrap();
+    editor.commit("Update");
+    assert!(!editor.view().modified);
+    editor.apply(Command::Blend { index: 0, share: 0.5 }).unwrap();
+    assert!(!editor.view().modified, "a blend is what the saved poses make");
 }
 
 #[test]

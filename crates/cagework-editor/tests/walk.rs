@@ -68,7 +68,9 @@ fn command() -> impl Strategy<Value = Command> {
         (index(), prop::option::of(interpolation()))
             .prop_map(|(index, interpolation)| { Command::SetPoseInterpolation { index, interpolation } }),
         (interpolation(), any::<bool>(), time()).prop_map(|(interpolation, loops, back)| {
-            Command::SetTransition { transition: Transition { interpolation, loops, back } }
+            Command::SetTransition {
+                transition: Transition { name: String::new(), interpolation, loops, back },
+            }
         }),
         (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
         (prop_oneof![Just(opened().view().cage_id), any::<u32>()], prop::collection::vec(vector(), 0..30))

@@ -3,6 +3,7 @@
 use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, shells_of_points};
 use cagework_core::words::decimals;
+use cagework_pose::Parts;
 use cagework_pose::humanoid::{Bone, Humanoid};
 use glam::{DMat4, DVec3, Vec3};
 use thiserror::Error;
@@ -252,6 +253,20 @@ impl Model {
         let low = |all: &[Vec3]| all.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
         let origin = self.up.vector_turned(self.origin).y;
         Ground::at_rest([low(&self.positions), low(posed)].map(|low| origin + low))
+    }
+
+    /// Heights of the lowest vertex at rest, for a model that [`Self::write_reshaped`] writes with these displacements,
+    /// except those of rigid attachments.
+    ///
+    /// # Errors
+    /// As [`Self::skeleton`].
+    pub fn ground_of_rig(&self, by: &[DVec3], parts: &Parts) -> Result<Ground, WriteError> {
+        let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
+        let rest = self.positions_in_file();
+        let rig = Rig::new(document, &rest, self.origin)?;
+        let by = rig.held(parts, &rest, self.all_moved(&rig, by)?);
+        let up = self.up.vector_turned_back(DVec3::Y);
+        Ok(rig.ground(&by, &rig.carried_in_hands(&self.triangles), up))
     }
 
     /// Lifts or lowers a model that is written without its rig: by the lift of [`ReshapeOptions::skeleton`], if it has

@@ -10,6 +10,8 @@ use crate::error::WriteError;
 pub const MAX_SECONDS: f32 = 3600.0;
 /// Smallest allowed time between a pose and the next one, seconds.
 pub const MIN_GAP: f32 = 1e-3;
+/// Name of the clip that plays poses, unless the user has named it.
+const CLIP_NAME: &str = "poses";
 /// Time between two poses that have no times of their own, seconds.
 pub const SECONDS_PER_POSE: f32 = 1.0;
 
@@ -76,6 +78,8 @@ pub struct Timeline {
     /// Times are ascending.
     keys: Vec<TimelineKey>,
     n_poses: usize,
+    /// Name of the clip; empty for [`CLIP_NAME`].
+    name: String,
 }
 
 /// A time of a timeline and the shape that it shows.
@@ -108,7 +112,7 @@ impl Timeline {
     pub fn every_second(n_poses: usize) -> Self {
         let pose = |k: usize| k.checked_sub(1).filter(|&pose| pose < n_poses);
         let keys = (0..n_poses + 2).map(|k| TimelineKey::new(k as f32 * SECONDS_PER_POSE, pose(k))).collect();
-        Self { keys, n_poses }
+        Self { keys, n_poses, name: String::new() }
     }
 
     /// Creates a timeline that shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at
@@ -126,14 +130,14 @@ impl Timeline {
         if let (Some(back), Some(last)) = (seconds_back, keys.last()) {
             keys.push(TimelineKey::new(last.seconds + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].pose));
         }
-        Ok(Self { keys, n_poses: seconds.len() })
+        Ok(Self { keys, n_poses: seconds.len(), name: String::new() })
     }
 
     /// Creates a timeline with one pose at each key time of a clip. `seconds`: ascending, not checked.
     #[must_use]
     pub fn at_keys(seconds: &[f32]) -> Self {
         let keys = seconds.iter().enumerate().map(|(k, &at)| TimelineKey::new(at, Some(k))).collect();
-        Self { keys, n_poses: seconds.len() }
+        Self { keys, n_poses: seconds.len(), name: String::new() }
     }
 
     /// Replaces the interpolation between all keys.
@@ -151,6 +155,35 @@ impl Timeline {
                 key.interpolation = own;
             }
         }
+        self
+    }
+
+    /// Replaces the name of the clip. An empty name stands for "poses".
+    #[must_use]
+    pub fn named(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
+    /// Name of the clip.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        if self.name.is_empty() { CLIP_NAME } else { &self.name }
+    }
+
+    /// Whether a key shows the shape at rest.
+    #[must_use]
+    pub fn shows_rest(&self) -> bool {
+        self.keys.iter().any(|key| key.pose.is_none())
+    }
+
+    /// Adds a pose, which takes the place of the shape at rest.
+    #[must_use]
+    pub fn with_rest_as_pose(mut self) -> Self {
+        for key in &mut self.keys {
+            key.pose = key.pose.or(Some(self.n_poses));
+        }
+        self.n_poses += 1;
         self
     }
 
@@ -305,6 +338,10 @@ mod tests {
     fn one_pose_per_second_from_rest_to_rest() {
         let timeline = Timeline::every_second(2);
         assert_eq!((timeline.seconds(), timeline.times()), (3.0, vec![0.0, 1.0, 2.0, 3.0]));
+        // A quarter of the way from rest to the first pose, rest is the pose after the last one.
+        assert!(timeline.shows_rest());
+        near(&timeline.clone().with_rest_as_pose().shares(0.25), &[0.25, 0.0, 0.75]);
+        assert_eq!([timeline.name(), timeline.clone().named("wave").name()], ["poses", "wave"]);
         for (seconds, expected) in [
             (0.0, [0.0, 0.0]),
             (0.25, [0.25, 0.0]),
@@ -324,6 +361,7 @@ mod tests {
         let timeline = Timeline::new(&[0.0, 0.4, 1.2], None).unwrap();
         assert_eq!((timeline.seconds(), timeline.times()), (1.2, vec![0.0, 0.4, 1.2]));
         near(&timeline.shares(0.1), &[0.75, 0.25, 0.0]);
+        assert!(!timeline.shows_rest());
         near(&timeline.shares(1.0), &[0.0, 0.25, 0.75]);
         near(&timeline.shares(9.0), &[0.0, 0.0, 1.0]);
         let step = timeline.clone().with(Interpolation::Step);

@@ -2,7 +2,7 @@
 
 use cagework_core::bind::BindError;
 use cagework_core::words::counted;
-use cagework_io::{MemoryError, ModelFormat, SelectError, TimelineError, WriteError};
+use cagework_io::{MemoryError, ModelFormat, ReadError, SelectError, TimelineError, WriteError};
 use thiserror::Error;
 
 /// Reason why a model file cannot be deformed.
@@ -126,6 +126,9 @@ pub enum JobError {
         /// The memory that is needed, and the limit.
         source: MemoryError,
     },
+    /// A file with a moved rig, to which morph targets are added, cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// The rig cannot be read, or the file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

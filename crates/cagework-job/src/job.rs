@@ -399,9 +399,12 @@ impl<'m> Job<'m> {
                 let by = follow.displacements(model, pose)?;
                 Shape::Rig { by, targets: Vec::new(), outside: follow.outside()? }
             }
-            (Kind::Rig | Kind::Clips, Poses::Targets { all, .. }) => {
+            (Kind::Rig | Kind::Clips, Poses::Targets { base, all, .. }) => {
                 let targets = named(all, |pose| follow.displacements(model, pose))?;
-                let by = vec![DVec3::ZERO; targets.first().map_or(0, |(_, by)| by.len())];
+                let by = match base {
+                    Some(base) => follow.displacements(model, base)?,
+                    None => vec![DVec3::ZERO; targets.first().map_or(0, |(_, by)| by.len())],
+                };
                 Shape::Rig { by, targets, outside: follow.outside()? }
             }
             (Kind::Mesh, Poses::Shape(pose)) => {
@@ -409,9 +412,17 @@ impl<'m> Job<'m> {
                 model.lift(&mut vertices, options);
                 Shape::Mesh { vertices, targets: Vec::new() }
             }
-            (Kind::Mesh, Poses::Targets { all, .. }) => {
-                let targets = named(all, |pose| follow.vertices(model, pose, &options.parts))?;
-                Shape::Mesh { vertices: model.positions.clone(), targets }
+            (Kind::Mesh, Poses::Targets { base, all, .. }) => {
+                let mut targets = named(all, |pose| follow.vertices(model, pose, &options.parts))?;
+                let mut vertices = model.positions.clone();
+                if let Some(base) = base {
+                    vertices = follow.vertices(model, base, &options.parts)?;
+                    let low = vertices.first().map_or(0.0, |p| p.y);
+                    model.lift(&mut vertices, options);
+                    let lift = vertices.first().map_or(0.0, |p| p.y) - low;
+                    targets.iter_mut().flat_map(|(_, target)| target).for_each(|p| p.y += lift);
+                }
+                Shape::Mesh { vertices, targets }
             }
             (Kind::Capture | Kind::Frames(_), poses) => {
                 Shape::Space(follow.field(poses.require_shape("space")?)?)
@@ -434,6 +445,29 @@ impl<'m> Job<'m> {
         Ok(skeleton.map_err(|e| self.of_write(e))?)
     }
 
+    /// Adds morph targets to a written file with a moved rig. `targets`: displacements from the shape at rest; the morph
+    /// targets are their differences from `by`, the displacements that the file contains.
+    fn with_targets(
+        &self,
+        bytes: Vec<u8>,
+        by: &[DVec3],
+        mut targets: Vec<(String, Vec<DVec3>)>,
+        outside: &[u32],
+        options: &ReshapeOptions,
+    ) -> Result<Vec<u8>, JobError> {
+        for (_, target) in &mut targets {
+            target.iter_mut().zip(by).for_each(|(target, by)| *target -= *by);
+        }
+        let mut moved = Model::read("moved.glb", &bytes, &mut |_| None)?;
+        moved.set_up(self.model().up());
+        moved.set_origin(self.model().origin());
+        let ReshapeOptions { timeline, rigid, parts, expressions, .. } = options.clone();
+        let options = ReshapeOptions { timeline, rigid, parts, expressions, ..ReshapeOptions::default() };
+        let still = vec![DVec3::ZERO; by.len()];
+        let written = moved.write_reshaped(&still, outside, &targets, &options);
+        Ok(written.map_err(|e| self.of_write(e))?.0)
+    }
+
     /// Writes the deformed model.
     ///
     /// # Errors
@@ -445,9 +479,15 @@ impl<'m> Job<'m> {
         match shape {
             Shape::Rig { by, targets, outside } => {
                 let options = ReshapeOptions { timeline, ..self.options.reshape.clone() };
-                let reshaped = model.write_reshaped(&by, &outside, &targets, &options);
+                let is_moved = by.iter().any(|by| *by != DVec3::ZERO);
+                let first = if is_moved { &[] } else { &*targets };
+                let reshaped = model.write_reshaped(&by, &outside, first, &options);
                 let (bytes, report) = reshaped.map_err(|e| self.of_write(e))?;
-                written.bytes = bytes;
+                written.bytes = if is_moved && !targets.is_empty() {
+                    self.with_targets(bytes, &by, targets, &outside, &options)?
+                } else {
+                    bytes
+                };
                 written.notices.extend(report.notices());
                 written.rig = Some(report);
             }

@@ -19,8 +19,10 @@ pub struct NamedPose {
 pub enum Poses {
     /// The model takes the shape of this pose. `[n_controls]`, object units
     Shape(Vec<Vec3>),
-    /// The model stays at rest, and each pose becomes a morph target.
+    /// Each pose becomes a morph target.
     Targets {
+        /// Pose whose shape the model takes; `None` for the shape at rest. `[n_controls]`, object units
+        base: Option<Vec<Vec3>>,
         /// The poses.
         all: Vec<NamedPose>,
         /// When an animation shows them; `None` without an animation.
@@ -67,7 +69,7 @@ impl Poses {
             return Err(JobError::NoPoses);
         }
         if expressions && times.is_none() && interpolation.is_none() {
-            return Ok(Self::Targets { all, timeline: None });
+            return Ok(Self::Targets { base: None, all, timeline: None });
         }
         let timeline = match times {
             Some(times) if times.len() == n => Timeline::new(times, None)?,
@@ -75,7 +77,11 @@ impl Poses {
             None if keys.len() == n => Timeline::at_keys(keys),
             None => Timeline::every_second(n),
         };
-        Ok(Self::Targets { all, timeline: Some(timeline.with(interpolation.unwrap_or_default())) })
+        Ok(Self::Targets {
+            base: None,
+            all,
+            timeline: Some(timeline.with(interpolation.unwrap_or_default())),
+        })
     }
 
     /// When an animation shows the morph targets; `None` without one.

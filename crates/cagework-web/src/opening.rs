@@ -51,7 +51,7 @@ impl OpenContents {
             poses: settings.poses(given, cage.as_ref()),
             cage,
             shares: settings.shares(),
-            transition: settings.transition.unwrap_or_default(),
+            transition: settings.transition.clone().unwrap_or_default(),
             pins: settings.pins.clone(),
             bones: settings.given_bones(),
             sample: settings.sample.clone().filter(is_known).or(self.sample),

@@ -51,6 +51,8 @@ pub(crate) struct JsSceneOptions {
     pub(crate) problems: bool,
     /// How the next export treats joints, which determines where the joints are marked. Null hides the marks.
     pub(crate) joints: Option<Joints>,
+    /// Whether exports keep the models on their ground, so that the floor is drawn below the posed models.
+    pub(crate) ground: bool,
 }
 
 impl Default for JsSceneOptions {
@@ -67,6 +69,7 @@ impl Default for JsSceneOptions {
             compare: vec![Coordinates::Harmonic],
             problems: true,
             joints: None,
+            ground: false,
         }
     }
 }

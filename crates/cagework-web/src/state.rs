@@ -51,6 +51,8 @@ pub(crate) struct State {
     /// Notices from the last export: changes of the rig, and data that the file format loses.
     pub(crate) rig_notices: Vec<String>,
     ground: KnownGround,
+    /// Height by which exports lift the models, object units, and the pose and models that it was computed for.
+    pub(crate) lift: (Option<(Arc<[Vec3]>, u64)>, f32),
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
     /// Weights on a lattice around the cage. They deform splats, and models that a clip moves.
@@ -410,6 +412,7 @@ impl State {
 
     /// Writes the camera to the GPU sessions, and also playback, splats, pose and scene if they have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
+        self.update_lift();
         let scene = self.is_changed.then(|| self.scene());
         match &mut self.playing {
             Some(playing) if playing.is_new => {
@@ -439,6 +442,23 @@ impl State {
         }
         self.is_moved &= !self.is_on_gpu() && self.set().is_some();
         self.is_changed = false;
+    }
+
+    /// Recomputes [`Self::lift`] when a pose becomes part of a history step. During a gesture the floor stays.
+    fn update_lift(&mut self) {
+        if self.bound.is_none() {
+            self.lift = (None, 0.0);
+        }
+        if !self.view.ground || self.bound.is_none() || !self.editor.is_pose_committed() {
+            return;
+        }
+        let of = (Arc::clone(&self.editor.document().pose), self.editor.models_key());
+        if self.lift.0.as_ref().is_some_and(|(pose, models)| Arc::ptr_eq(pose, &of.0) && *models == of.1) {
+            return;
+        }
+        // A rig that cannot be read cannot be exported either, and the export says why.
+        self.lift = (Some(of), self.bound_document().lift().unwrap_or_default());
+        self.is_changed = true;
     }
 
     /// Writes a saved pose to the GPU. The next frame writes the current pose and the frame of the clip again.

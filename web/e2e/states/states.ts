@@ -140,6 +140,13 @@ const selected = (count: number, last: number | null): AppState["selected"] => (
 const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
   values.map((value) => ({ ...also, [key]: value }) as Patch);
 
+/** Two saved poses, of which the first is shown, and one of another cage. */
+const TWO_POSES: Patch = {
+  poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k, interpolation: null, hash: k })),
+  shares: [1, 0, 0],
+  animationSeconds: 3,
+};
+
 /** For each step, changes of `BOUND_STATE` with which its panel shows as much as it can contain. */
 const full = (): Record<AppState["step"], Patch> => ({
   model: {
@@ -169,9 +176,9 @@ const full = (): Record<AppState["step"], Patch> => ({
     pins: [{ triangle: 0, bary: [1, 0, 0] }],
     tools: { ...INITIAL_STATE.tools, symmetry: true, proportionalOn: true },
     unmatched: 3,
-    poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }],
-    shares: [0.5],
-    clip: { ...INITIAL_STATE.clip, clip: 0 },
+    ...TWO_POSES,
+    modified: true,
+    posed: true,
     scene: { ...INITIAL_STATE.scene, slice: "value", colour: "weight" },
     humanoid: HUMANOID,
     factors: [2, 2],
@@ -184,7 +191,7 @@ const full = (): Record<AppState["step"], Patch> => ({
   export: {
     model: TWO_MODELS,
     cage: CAGE_WITH_CONTROLS,
-    poses: [{ name: "01", fits: true, seconds: 1, interpolation: "step", hash: 7 }],
+    ...TWO_POSES,
   },
 });
 
@@ -285,13 +292,13 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { scene: { ...INITIAL_STATE.scene, original: true } },
     { boxArmed: true, ortho: true },
     { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
+    { ...TWO_POSES, shares: [0.5, 1, 0], playing: true, playingPose: null, posed: true },
+    { ...TWO_POSES, model: { ...RIG, clips: [], targets: [] }, playing: true, playingPose: "01" },
     {
-      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k, interpolation: null, hash: 7 })),
-      shares: [0.5, 1, 0],
-      playing: true,
-      playingPose: null,
-      posed: true,
+      model: { ...RIG, clips: [], rigged: false, joints: 0 },
+      walk: { name: "02", clips: [["1", 2]], clip: 0 },
     },
+    { hoversAlone: true },
     {
       clip: { ...INITIAL_STATE.clip, clip: 0, playing: true },
       rigOptions: { ...INITIAL_STATE.rigOptions, rigid: ["1"] },
@@ -406,6 +413,14 @@ async function start(): Promise<void> {
   const whole = full();
   const visits = new Map([
     ...STEPS.map((step) => [step, () => visit({ step, ...whole[step] })] as const),
+    [
+      "timeline",
+      async () => {
+        await visit({ step: "pose", ...TWO_POSES, bound: true });
+        document.querySelector<HTMLElement>(".timeline-row > :last-child")?.click();
+        await rendered();
+      },
+    ] as const,
     ...DIALOGS.map((patch, k) => [`dialog ${k}`, () => visit(patch)] as const),
     ...STOPS.map((name, stop) => {
       const { binds, step } = stopsOf(true)[name];

@@ -100,6 +100,15 @@ export function createBind(ctx: Context) {
       const engine = ctx.engine();
       return bound || engine.hasWeights || bindRun?.revision === engine.revision;
     },
+    /** Draws the model with the colours of a weight; undefined if that is not possible now. */
+    async drawWeight(width: number, height: number, column: number): Promise<Blob | undefined> {
+      if (!store.get().bound) return undefined;
+      // The next bind, or an error of the next frame, is reported elsewhere.
+      return ctx
+        .session()
+        .weightPicture(width, height, column)
+        .catch(() => undefined);
+    },
     setOptions(patch: Partial<BindOptions>) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },

@@ -19,6 +19,8 @@ export interface Messages {
   problem(explained: Explanation, fix?: Fix): void;
   /** Removes all error messages and questions. Called when the user starts something new. */
   clear(): void;
+  /** Closes the latest message. Returns false if there is none. */
+  closeLatest(): boolean;
 }
 
 export interface Context {

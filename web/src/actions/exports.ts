@@ -3,7 +3,7 @@
 import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
 import { EXPORT_TYPES, MAX_PICTURE } from "../defaults";
-import { isCapture, rigOf, shapeFormatOf } from "../derived";
+import { animationName, exportsAnimation, isCapture, rigOf, shapeFormatOf } from "../derived";
 import { exportStem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -33,9 +33,12 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
 
   /** Exports that write one file for each model. */
   const own = {
-    glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
+    glb: (id: number) =>
+      exportsAnimation(ctx.store.get())
+        ? engine().exportPoses(id, rig(), true, animationName(ctx.store.get()))
+        : engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
     shape: (id: number) => engine().exportShape(id, format(), ctx.store.get().shapeMoment === "frame"),
-    poses: (id: number) => engine().exportPoses(id, rig()),
+    poses: (id: number) => engine().exportPoses(id, rig(), false, animationName(ctx.store.get())),
     weights: (id: number) => engine().exportWeights(id),
   };
   const isOwn = (kind: string): kind is keyof typeof own => kind in own;

@@ -7,6 +7,7 @@ import { follow } from "../queue";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
+import type { CageAnimation, Player } from "./player";
 
 /** A cage and its poses, stored before the cage is replaced. */
 export interface CageSnapshot {
@@ -26,21 +27,29 @@ export function snapshotCage(ctx: Context): CageSnapshot | undefined {
 }
 
 /** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for high-density screens. */
-const PICTURE = [128, 96] as const;
+const PICTURE = [224, 168] as const;
 
-export function createPoses(ctx: Context, edit: Edit) {
+export function createPoses(
+  ctx: Context,
+  edit: Edit,
+  player: Player,
+  walk: { readonly animation: CageAnimation },
+) {
   const { store, engine } = ctx;
-  let frame: number | undefined;
+  const { stop } = player;
 
-  const stop = () => {
-    if (frame === undefined) return;
-    cancelAnimationFrame(frame);
-    frame = undefined;
-    engine().revert();
-    store.set({ playing: false, playingPose: null });
+  /** The animation of the saved poses. */
+  const animation: CageAnimation = {
+    extent: () => ({ seconds: store.get().animationSeconds, loops: store.get().transition.loops }),
+    show(seconds) {
+      engine().playAt(seconds);
+      const next = fittingPoses(store.get()).find((pose) => pose.seconds >= seconds);
+      store.set({ playingPose: next?.name ?? null });
+      return true;
+    },
   };
-  // Undo steps must not contain an intermediate pose of the animation.
-  edit.alsoSettles(stop);
+  /** What the timeline plays: the clip of a rig that the cage follows, or the saved poses. */
+  const shown = () => (store.get().walk ? walk.animation : animation);
 
   const carry = ({ cage, id, poses, shares }: CageSnapshot, label?: string): Promise<boolean> => {
     const n = cage.positions.length;
@@ -59,20 +68,6 @@ export function createPoses(ctx: Context, edit: Edit) {
         if (!label) engine().amend();
       }),
     );
-  };
-
-  const step = (start: number) => (now: number) => {
-    const { animationSeconds, transition } = store.get();
-    const played = (now - start) / 1000;
-    if (played > animationSeconds && !transition.loops) {
-      stop();
-      return;
-    }
-    const seconds = played % Math.max(animationSeconds, 0.001);
-    engine().playAt(seconds);
-    const next = fittingPoses(store.get()).find((pose) => pose.seconds >= seconds);
-    store.set({ playingPose: next?.name ?? null });
-    frame = requestAnimationFrame(step(start));
   };
 
   let isDrawing = false;
@@ -176,20 +171,15 @@ export function createPoses(ctx: Context, edit: Edit) {
       if (store.get().posed) edit.apply({ do: "reset_pose" }, T.did.reset);
     },
     togglePlay() {
-      if (frame !== undefined) {
-        stop();
-        return;
-      }
-      // Ends a clip that the cage follows.
-      edit.settle();
-      if (fittingPoses(store.get()).length === 0) {
-        ctx.tell.say(T.pose.saveFirst);
-        return;
-      }
-      edit.setEditingRest(false);
-      frame = requestAnimationFrame(step(performance.now()));
-      store.set({ playing: true });
+      if (player.isPlaying()) stop();
+      else if (store.get().walk) player.play(walk.animation);
+      else if (fittingPoses(store.get()).length > 0) player.play(animation);
+      else ctx.tell.say(T.pose.saveFirst);
     },
+    /** Moves the playhead. */
+    scrub: (seconds: number) => player.scrub(shown(), seconds),
+    /** Keeps the pose at the playhead as one undo step. */
+    keepMoment: () => void engine().commit(T.did.scrub),
     stop,
   };
 }

@@ -23,11 +23,3 @@ export function createTour(ctx: Context, needs: GuideNeeds) {
     guide: (): Guide | undefined => (ctx.store.get().tour ? loaded?.guide : undefined),
   };
 }
-
-/** Returns the stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
-export function stopOf(fragment: string): number | undefined {
-  const said = new URLSearchParams(fragment.slice(1)).get("tour");
-  return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);
-}
-
-export const linkOf = (stop: number): string => `#tour=${stop + 1}`;

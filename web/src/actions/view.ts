@@ -1,5 +1,6 @@
 /** Scene options and camera. */
 
+import { effect, untracked } from "@preact/signals";
 import type { Element as CageElement, Coordinates, SceneOptions, Tools } from "../contract";
 import { SCENE_DEFAULTS } from "../defaults";
 import { drawn, elementInUse } from "../derived";
@@ -37,6 +38,14 @@ export function createView(
     engine().setScene(drawn(store.get()));
     store.set({ legend: engine().legend() ?? null });
   };
+
+  let isOnGround = false;
+  // The floor is drawn where exports put it.
+  effect(() => {
+    const { ground } = drawn(store.get());
+    if (ground !== isOnGround) untracked(() => engine().setScene(drawn(store.get())));
+    isOnGround = ground;
+  });
 
   const theme = (choice: Theme) => {
     if (choice === "auto") delete document.documentElement.dataset.theme;

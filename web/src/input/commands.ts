@@ -73,6 +73,7 @@ export function createCommands(app: App): Record<Command, () => void> {
       else if (store.get().painting) painting.on(null);
       else if (store.get().boxArmed) store.set({ boxArmed: false });
       else if (store.get().playing) poses.stop();
+      else if (app.ctx.tell.closeLatest()) return;
       else if (store.get().seeOpen) store.set({ seeOpen: false });
       else void tour.guide()?.end();
     },

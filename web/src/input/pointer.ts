@@ -264,6 +264,7 @@ export function attachPointer(stage: Stage, app: App): void {
         } else if (!drag && ready() && store.get().cage && !store.get().painting) {
           const under = engine().pick(pointer.x, pointer.y, MOUSE_RADIUS);
           engine().hover(under);
+          store.set({ hoversAlone: under.length === 1 && engine().movesAlone(under[0] ?? 0) });
           const isOver = under.length > 0;
           const { pull: canPull } = store.get().scene;
           const isHeld = !isOver && canPull && !event.altKey && pull.hover(pointer.x, pointer.y);

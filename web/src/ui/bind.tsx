@@ -1,51 +1,109 @@
-/** Step 3: bind options, memory needed, progress and report. */
+/** Step 3: result, fineness, and, folded, how the bind is computed: options, memory, plot and figures. */
 
+import { useEffect, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { BindOptions } from "../contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS, SLIDERS } from "../defaults";
-import { cageBroken, hasUnappliedOptions } from "../derived";
+import { cageBroken, hasUnappliedOptions, isCapture } from "../derived";
 import { inUnit, percent } from "../format";
 import type { BindRun } from "../state";
 import { T } from "../words";
-import { Button, Fold, fieldsOf, Head, NumberField, Say, Section, Segments, Slider } from "./controls";
+import { Button, Fold, fieldsOf, Head, NumberField, Say, Segments, Slider } from "./controls";
 import { curvesOf } from "./curves";
 import { Icon } from "./icons";
 import { Plot } from "./plot";
-import { CompareTable, ReportCard } from "./report";
+import { CompareTable, ReportCard, sayResult } from "./report";
 
-/** Numbers of cells that the panel offers; 0 is automatic. */
-const GRIDS = [0, 32, 64, 128, 256];
+/** Numbers of cells along the cage's longest side that the panel offers; 0 is automatic. */
+const GRIDS = [0, 32, 64, 128, 256] as const;
+/** Size of the picture of a weight, pixels: twice its CSS pixels, for high-density screens. */
+const PICTURE = [656, 400] as const;
 const SPARSIFY = [0, 0.00001, 0.001] as const;
 
 export function BindPanel({ app }: { app: App }) {
-  const { bindRun, report, earlier, bound } = app.store.get();
+  const { bindRun, report, earlier, bound, tour, memory } = app.store.get();
+  const result = report && bound ? report : null;
   return (
     <div class="stack loose">
-      <Head title={T.bind.title} sentence={T.bind.sentence} />
+      <Head title={T.bind.title} sentence={result ? sayResult(result) : T.bind.sentence} />
       {bindRun && <Running run={bindRun} />}
-      <div class="stack">
-        {report && bound && <ReportCard report={report} />}
+      {result && <Weight app={app} />}
+      <Fineness app={app} />
+      {typeof memory !== "number" && <Memory app={app} />}
+      <Fold title={T.bind.how} open={tour !== null}>
+        {result && <ReportCard report={result} />}
         {report && earlier.length > 0 && (
           <div class="stack tight">
-            <h3 class="section-title">{T.bind.beside}</h3>
+            <h3 class="section-title" data-tip={T.bind.besideSentence}>
+              {T.bind.beside}
+            </h3>
             <CompareTable reports={[report, ...earlier]} />
-            <p class="hint">{T.bind.besideSentence}</p>
           </div>
         )}
-      </div>
-      <Figure app={app} />
-      <Section title={T.bind.how}>
-        {hasUnappliedOptions(app.store.get()) && !bindRun && (
-          <p class="memory">
-            <Icon name="info" />
-            {T.bind.unapplied}
-          </p>
-        )}
+        <Figure app={app} />
         <Ways app={app} />
         <Place app={app} />
-        <Memory app={app} />
+        {typeof memory === "number" && <Memory app={app} />}
         <Advanced app={app} />
-      </Section>
+      </Fold>
+    </div>
+  );
+}
+
+/** Picture of the weight of the last selected handle, or of the first one. */
+function Weight({ app }: { app: App }) {
+  const { report, selected, model } = app.store.get();
+  const [picture, setPicture] = useState<string | null>(null);
+  const column = selected.last ?? 0;
+  useEffect(() => {
+    let isCurrent = true;
+    let url: string | undefined;
+    void app.bind.drawWeight(...PICTURE, column).then((drawn) => {
+      if (!drawn || !isCurrent) return;
+      url = URL.createObjectURL(drawn);
+      setPicture(url);
+    });
+    return () => {
+      isCurrent = false;
+      if (url) URL.revokeObjectURL(url);
+    };
+  }, [app, report, column]);
+  if (!picture || isCapture(model)) return null;
+  return (
+    <figure class="figure">
+      <img class="weight-picture" src={picture} alt="" width={PICTURE[0] / 2} height={PICTURE[1] / 2} />
+      <figcaption class="hint">{T.bind.weight(column)}</figcaption>
+    </figure>
+  );
+}
+
+/** The number of grid cells, as a slider from coarse to fine. */
+function Fineness({ app }: { app: App }) {
+  const { bindOptions, bindRun } = app.store.get();
+  const { grid } = bindOptions;
+  const names = T.bind.finenesses;
+  // A project can contain another number of cells than the panel offers.
+  const place = GRIDS.findLastIndex((cells) => cells <= grid);
+  return (
+    <div class="stack tight">
+      <Slider
+        label={T.bind.fineness}
+        tip={T.bind.finenessTip}
+        min={0}
+        max={GRIDS.length - 1}
+        step={1}
+        format={(k) =>
+          k === 0 ? T.bind.auto : T.bind.cells(names[k - 1] ?? "", k === place ? grid : GRIDS[k])
+        }
+        value={place}
+        onChange={(k) => app.bind.setOptions({ grid: GRIDS[k] ?? 0 })}
+      />
+      {hasUnappliedOptions(app.store.get()) && !bindRun && (
+        <p class="memory">
+          <Icon name="info" />
+          {T.bind.unapplied}
+        </p>
+      )}
     </div>
   );
 }
@@ -107,12 +165,6 @@ function Ways({ app }: { app: App }) {
         <Button label={T.bind.ours} onClick={() => preset(BIND_DEFAULTS)} tip={T.bind.oursTip} />
         <Button label={T.bind.published} onClick={() => preset(PAPER_DEFAULTS)} tip={T.bind.publishedTip} />
       </div>
-      <Segments
-        label={options.method === "classic" ? T.bind.gridEach : T.bind.grid}
-        values={GRIDS}
-        labels={(cells) => (cells === 0 ? T.bind.auto : String(cells))}
-        {...option("grid")}
-      />
       <Segments
         label={T.bind.method}
         labels={T.bind.methods}

@@ -5,7 +5,7 @@ import type { CageOptions } from "../contract";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
-import { fieldsOf, Segments, Select, SHARES, Slider, Toggle } from "./controls";
+import { Fold, fieldsOf, Segments, Select, SHARES, Slider, Toggle } from "./controls";
 
 /**
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
@@ -32,13 +32,6 @@ export function Automatic({ app }: { app: App }) {
   const [detail, voxels] = [option("detail"), option("voxels")];
   return (
     <div class="stack">
-      <Segments
-        label={T.cage.follow}
-        labels={T.cage.follows}
-        tips={T.cage.followTips}
-        {...option("kind")}
-        values={FOLLOWED}
-      />
       <Slider label={T.cage.wanted} {...SLIDERS.target} format={count} {...option("target")} />
       <Slider
         label={T.cage.closeness}
@@ -48,32 +41,41 @@ export function Automatic({ app }: { app: App }) {
         value={closenessOf(detail.value)}
         onChange={(closeness) => detail.onChange(detailOf(closeness))}
       />
-      <Toggle label={T.cage.quads} sentence={T.cage.quadsSentence} {...option("quads")} />
-      <Segments label={T.cage.symmetry} labels={T.cage.symmetries} {...option("symmetry")} />
-      <Slider
-        label={T.cage.margin}
-        {...SLIDERS.clearance}
-        format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
-        {...option("clearance")}
-      />
-      <Slider
-        label={T.cage.gaps}
-        {...SLIDERS.voxels}
-        format={(value) =>
-          value === MIN_VOXELS ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
-        }
-        value={voxels.value || MIN_VOXELS}
-        onChange={(value) => voxels.onChange(value === MIN_VOXELS ? 0 : value)}
-      />
-      {named.length > 0 && (
-        <Select
-          label={T.cage.around}
-          none={T.cage.aroundRest}
-          options={named.map((name) => [name, name])}
-          {...fieldsOf(app.store.get(), app.store.set)("cageClip")}
+      <Fold title={T.more}>
+        <Segments
+          label={T.cage.follow}
+          labels={T.cage.follows}
+          tips={T.cage.followTips}
+          {...option("kind")}
+          values={FOLLOWED}
         />
-      )}
-      <Toggle label={T.cage.perPart} sentence={T.cage.perPartSentence} {...option("per_component")} />
+        <Toggle label={T.cage.quads} sentence={T.cage.quadsSentence} {...option("quads")} />
+        <Segments label={T.cage.symmetry} labels={T.cage.symmetries} {...option("symmetry")} />
+        <Slider
+          label={T.cage.margin}
+          {...SLIDERS.clearance}
+          format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
+          {...option("clearance")}
+        />
+        <Slider
+          label={T.cage.gaps}
+          {...SLIDERS.voxels}
+          format={(value) =>
+            value === MIN_VOXELS ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
+          }
+          value={voxels.value || MIN_VOXELS}
+          onChange={(value) => voxels.onChange(value === MIN_VOXELS ? 0 : value)}
+        />
+        {named.length > 0 && (
+          <Select
+            label={T.cage.around}
+            none={T.cage.aroundRest}
+            options={named.map((name) => [name, name])}
+            {...fieldsOf(app.store.get(), app.store.set)("cageClip")}
+          />
+        )}
+        <Toggle label={T.cage.perPart} sentence={T.cage.perPartSentence} {...option("per_component")} />
+      </Fold>
     </div>
   );
 }

@@ -8,7 +8,7 @@ import { count, percent } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Automatic } from "./cage-options";
-import { Badge, Button, Facts, fieldsOf, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
+import { Badge, Button, fieldsOf, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon } from "./icons";
 import { Inside, Smooth } from "./inside";
 
@@ -17,10 +17,15 @@ export function CagePanel({ app }: { app: App }) {
   const option = fieldsOf(app.store.get(), app.store.set);
   return (
     <div class="stack loose">
-      <Head title={T.cage.title} sentence={T.cage.sentence} />
+      <Head title={T.cage.title} sentence={cage ? undefined : T.cage.sentence} />
       <div class="stack">
-        <Segments label={T.cage.how} hideLabel labels={T.cage.sources} {...option("cageSource")} />
-        <p class="hint">{T.cage.about[cageSource]}</p>
+        <Segments
+          label={T.cage.how}
+          hideLabel
+          labels={T.cage.sources}
+          tips={T.cage.about}
+          {...option("cageSource")}
+        />
         {cageSource === "auto" && <Automatic app={app} />}
         {cageSource === "box" && (
           <Slider label={T.cage.divisions} {...SLIDERS.divisions} {...option("boxDivisions")} />
@@ -42,12 +47,12 @@ export function CagePanel({ app }: { app: App }) {
         </div>
       </Section>
       {cage && (
-        <Section title={T.cage.smooth}>
+        <div class="stack">
+          <Reshape app={app} />
           <Smooth app={app} cage={cage} />
-        </Section>
+          <Inside app={app} cage={cage} />
+        </div>
       )}
-      {cage && <Inside app={app} cage={cage} />}
-      <Section title={T.cage.shape}>{cage && <Reshape app={app} />}</Section>
     </div>
   );
 }
@@ -77,16 +82,17 @@ function CageCard({ cage, check }: { cage: CageState; check: readonly Problem[] 
   return (
     <div class="card stack tight">
       <div class="row wrap">
-        <strong>{T.cage.vertices(cage.info.vertices)}</strong>
+        <strong
+          data-tip={T.cage.facts(
+            cage.info.faces,
+            percent(cage.info.quads / Math.max(cage.info.faces, 1)),
+            cage.info.edges,
+          )}
+        >
+          {T.cage.vertices(cage.info.vertices)}
+        </strong>
         <CageBadge cage={cage} check={check} />
       </div>
-      <Facts
-        rows={[
-          [T.cage.ofQuads, percent(cage.info.quads / Math.max(cage.info.faces, 1))],
-          [T.cage.edges, count(cage.info.edges)],
-          [T.cage.faces, count(cage.info.faces)],
-        ]}
-      />
       {cage.info.notices.map((notice) => (
         <Say key={notice} kind="hint" text={sentence(notice)} />
       ))}

@@ -5,6 +5,7 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { createDraft, type Entry, type NumberRange, numberIn } from "../draft";
 import { percent } from "../format";
 import { type Message, textOf } from "../strings";
+import { T } from "../words";
 import { Icon, type IconName } from "./icons";
 
 /** A message. English text in a page of another language is marked for screen readers. */
@@ -110,6 +111,8 @@ export function switchOf<T>({ value, onChange }: Field<T>, on: T, off: T): Field
 
 interface SegmentsProps<T extends string | number> extends Field<T> {
   label: string;
+  /** Tool tip of the label. */
+  tip?: string;
   hideLabel?: boolean;
   /** The label of each value. A record also determines which values are offered, and their order. */
   labels: Readonly<Partial<Record<T, string>>> | ((value: T) => string);
@@ -121,11 +124,22 @@ interface SegmentsProps<T extends string | number> extends Field<T> {
 
 /** A choice of one of a few values: radio buttons drawn as segments of a bar. */
 export function Segments<T extends string | number>(props: SegmentsProps<T>) {
-  const { label, hideLabel, labels, values = Object.keys(labels) as T[], tips, disabled, ...field } = props;
+  const {
+    label,
+    tip,
+    hideLabel,
+    labels,
+    values = Object.keys(labels) as T[],
+    tips,
+    disabled,
+    ...field
+  } = props;
   const name = useUid();
   return (
     <fieldset class="field">
-      <legend class={hideLabel ? "visually-hidden" : "legend-text"}>{label}</legend>
+      <legend class={hideLabel ? "visually-hidden" : "legend-text"} data-tip={tip}>
+        {label}
+      </legend>
       <div class="segments">
         {values.map((value) => (
           <label key={value} data-tip={tips?.[value]}>
@@ -147,6 +161,7 @@ export function Segments<T extends string | number>(props: SegmentsProps<T>) {
 
 interface SelectProps<T extends string | number> extends Field<T | null> {
   label: string;
+  hideLabel?: boolean;
   /** Label of the choice that stands for null. */
   none: string;
   options: readonly (readonly [value: T, label: string])[];
@@ -159,10 +174,10 @@ interface SelectProps<T extends string | number> extends Field<T | null> {
 
 /** A list from which the user chooses one value or none. */
 export function Select<T extends string | number>(props: SelectProps<T>) {
-  const { label, none, options, name, disabled, kind = "stack tight", value, onChange } = props;
+  const { label, hideLabel, none, options, name, disabled, kind = "stack tight", value, onChange } = props;
   return (
     <label class={kind}>
-      <span class="legend-text">{label}</span>
+      <span class={hideLabel ? "visually-hidden" : "legend-text"}>{label}</span>
       <select
         aria-label={name}
         disabled={disabled}
@@ -180,22 +195,19 @@ export function Select<T extends string | number>(props: SelectProps<T>) {
   );
 }
 
-/** A switch with a label and an explanation. */
+/** A switch with a label. `sentence`: an explanation, shown as a tool tip. */
 export function Toggle(props: Field<boolean> & { label: string; sentence?: string }) {
   const id = useUid();
   const { label, sentence, value, onChange } = props;
   return (
-    <label class="switch" for={id}>
-      <span class="text">
-        <span>{label}</span>
-        {sentence && <small id={`${id}-s`}>{sentence}</small>}
-      </span>
+    <label class="switch" for={id} data-tip={sentence || undefined}>
+      <span class="text">{label}</span>
       <input
         type="checkbox"
         role="switch"
         id={id}
         aria-checked={value}
-        aria-describedby={sentence ? `${id}-s` : undefined}
+        aria-description={sentence || undefined}
         checked={value}
         onChange={(event) => onChange(event.currentTarget.checked)}
       />
@@ -219,6 +231,10 @@ interface SliderProps extends Field<number> {
   limits?: { readonly min: number; readonly max: number };
   /** Called on a double click. */
   onReset?: () => void;
+  /** Tool tip of the label. */
+  tip?: string;
+  /** Shows the value in a field, in which it can be typed, in percent. */
+  typed?: boolean;
 }
 
 /** Range and format of a slider for a fraction, 0 to 1, shown in percent. */
@@ -226,7 +242,20 @@ export const SHARES = { min: 0, max: 1, step: 0.01, format: percent } as const;
 
 /** A slider with its value next to the label. */
 export function Slider(props: SliderProps) {
-  const { label, value, onChange, onCommit, format = String, name, usual, limits, onReset, ...range } = props;
+  const {
+    label,
+    value,
+    onChange,
+    onCommit,
+    format = String,
+    name,
+    usual,
+    limits,
+    onReset,
+    tip,
+    typed,
+    ...range
+  } = props;
   const id = useUid();
   const band = usual && {
     "--min": range.min,
@@ -238,10 +267,25 @@ export function Slider(props: SliderProps) {
   };
   return (
     <div class={usual ? "field banded" : "field"} style={band}>
-      <label for={id} onDblClick={onReset}>
+      <label for={id} onDblClick={onReset} data-tip={tip}>
         {label}
-        <output for={id}>{format(value)}</output>
+        {!typed && <output for={id}>{format(value)}</output>}
       </label>
+      {typed && (
+        <span class="typed">
+          <NumberInput
+            name={T.percentOf(label)}
+            value={Math.round(100 * value)}
+            min={100 * range.min}
+            max={100 * range.max}
+            onChange={(percents) => {
+              onChange(percents / 100);
+              onCommit?.(percents / 100);
+            }}
+          />
+          <span aria-hidden="true">%</span>
+        </span>
+      )}
       <input
         {...range}
         type="range"
@@ -350,11 +394,11 @@ export function Section({ title, children }: { title: string; children: Componen
 }
 
 /** Heading of a panel, with a sentence below it. */
-export function Head({ title, sentence }: { title: string; sentence: string }) {
+export function Head({ title, sentence }: { title: string; sentence?: string }) {
   return (
     <div class="head">
       <h2>{title}</h2>
-      <p class="hint">{sentence}</p>
+      {sentence && <p class="hint">{sentence}</p>}
     </div>
   );
 }
@@ -369,10 +413,11 @@ export function Badge({ kind, icon, text }: { kind: "good" | "warn" | "bad"; ico
   );
 }
 
-/** Collapsible section. */
-export function Fold({ title, children }: { title: string; children: ComponentChildren }) {
+/** Collapsible section. `open`: whether it is open at first. */
+export function Fold(props: { title: string; children: ComponentChildren; open?: boolean }) {
+  const { title, children, open } = props;
   return (
-    <details class="fold">
+    <details class="fold" open={open}>
       <summary>{title}</summary>
       <div class="stack">{children}</div>
     </details>

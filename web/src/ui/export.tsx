@@ -3,24 +3,35 @@
 import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
 import type { ModelInfo } from "../contract";
-import { fittingPoses, isCapture, rigOf, shapeFormatOf, shapeFormatsOf } from "../derived";
+import {
+  animationName,
+  fittingPoses,
+  hasAnimation,
+  isCapture,
+  rigOf,
+  shapeFormatOf,
+  shapeFormatsOf,
+} from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
-import { fieldsOf, Head, Segments, Select, switchOf, Toggle } from "./controls";
+import { Fold, fieldsOf, Head, Segments, Select, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Privacy } from "./model";
 
 const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["glb", "model"],
   ["shape", "shape"],
+  ["picture", "image"],
+  ["project", "save"],
+];
+/** Exports that most people never use. */
+const MORE_ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["poses", "layers"],
   ["clips", "play"],
   ["cage", "cage"],
   ["controls", "bone"],
   ["weights", "table"],
-  ["picture", "image"],
-  ["project", "save"],
 ];
 
 /** Says why a file cannot be exported yet; null if it can. */
@@ -40,15 +51,21 @@ export function ExportPanel({ app }: { app: App }) {
     if (kind === "clips") return (model?.joints ?? 0) > 0;
     return !isCapture(model) || (kind !== "poses" && kind !== "weights");
   };
-  return (
-    <div class="stack loose">
-      <Head title={T.exports.title} sentence={T.exports.sentence} />
-      <Which app={app} />
-      <ul class="stack">
-        {ITEMS.filter(([kind]) => isThere(kind)).map(([kind, icon]) => (
+  const list = (items: typeof ITEMS) => (
+    <ul class="stack">
+      {items
+        .filter(([kind]) => isThere(kind))
+        .map(([kind, icon]) => (
           <Item key={kind} app={app} kind={kind} icon={icon} />
         ))}
-      </ul>
+    </ul>
+  );
+  return (
+    <div class="stack loose">
+      <Head title={T.exports.title} />
+      <Which app={app} />
+      {list(ITEMS)}
+      <Fold title={T.exports.more}>{list(MORE_ITEMS)}</Fold>
       <Privacy />
     </div>
   );
@@ -66,6 +83,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
         class="export-card"
         data-kind={kind}
         disabled={reason !== null}
+        data-tip={reason ?? (n > 0 ? T.exports.poses(n, sentence) : sentence)}
         onClick={() => (kind === "clips" ? app.chooseClips() : void app.exports.save(kind))}
       >
         <span class="tile">
@@ -73,7 +91,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
         </span>
         <span class="grow">
           <strong>{title}</strong>
-          <span class="hint">{reason ?? (n > 0 ? T.exports.poses(n, sentence) : sentence)}</span>
+          {reason && <span class="hint">{reason}</span>}
         </span>
         <Icon name="download" />
       </button>
@@ -110,20 +128,23 @@ function Which({ app }: { app: App }) {
   );
 }
 
-/** Options for the skeleton, morph targets and clips of the exported GLB. */
+/** Options for the animation, skeleton, morph targets and clips of the exported GLB. */
 function RigExport({ app }: { app: App }) {
-  const { model, rigOptions, clip } = app.store.get();
-  if (rigOf(app.store.get()).dynamic)
-    return <p class="export-option hint">{T.clips.baked(model?.clips[clip.clip ?? 0]?.name ?? "")}</p>;
-  if (!model?.rigged) return null;
+  const state = app.store.get();
+  const { model, clip } = state;
+  const isAnimated = hasAnimation(state);
+  if (!model?.rigged && !isAnimated) return null;
   return (
     <div class="export-option stack tight">
-      <Toggle
-        label={T.clips.keep}
-        sentence={T.clips.keepSentence(model.joints, model.targets.length, model.clips.length)}
-        {...switchOf(fieldsOf(rigOptions, app.clips.rig)("plain"), false, true)}
-      />
-      {!rigOptions.plain && <RigChoices app={app} />}
+      {rigOf(state).dynamic && <p class="hint">{T.clips.baked(model?.clips[clip.clip ?? 0]?.name ?? "")}</p>}
+      {isAnimated && (
+        <Toggle
+          label={T.timeline.include}
+          sentence={T.timeline.includeSentence(fittingPoses(state).length, animationName(state))}
+          {...fieldsOf(state, app.store.set)("withAnimation")}
+        />
+      )}
+      <RigChoices app={app} />
     </div>
   );
 }

@@ -64,7 +64,8 @@ const ICONS = {
   stays: lucide.Anchor,
   brush: lucide.Brush,
   copy: lucide.Copy,
-  grip: lucide.GripVertical,
+  loop: lucide.Repeat,
+  options: lucide.SlidersHorizontal,
 } satisfies Record<string, lucide.IconNode>;
 
 export type IconName = keyof typeof ICONS;

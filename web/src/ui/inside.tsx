@@ -6,7 +6,7 @@ import type { CageState, InnerKind } from "../contract";
 import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
-import { Button, Section, Segments, Slider, Toggle } from "./controls";
+import { Button, Fold, Segments, Slider, Toggle } from "./controls";
 import type { IconName } from "./icons";
 
 /** Default number of subdivision steps. More steps change the surface little. */
@@ -47,7 +47,7 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
   const many = (kind: InnerKind) => elements.filter((element) => kind in element).length;
   const isSelected = (selected.last ?? 0) >= cage.info.vertices;
   return (
-    <Section title={T.cage.inside}>
+    <Fold title={T.cage.inside} open={inner > 0 || placing !== null}>
       <div class="stack">
         <p class="hint">{T.cage.insideSentence}</p>
         <div class="tool-grid">
@@ -82,7 +82,7 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
           </>
         )}
       </div>
-    </Section>
+    </Fold>
   );
 }
 

@@ -7,7 +7,7 @@ import { asksToPull, isCapture } from "../derived";
 import { count, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { Button, Facts, Head, Say, Section, Segments } from "./controls";
+import { Button, Facts, Fold, Head, Say, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
 import { useTouch } from "./touch";
@@ -34,8 +34,7 @@ export function ModelPanel({ app }: { app: App }) {
       <div class="dropzone">
         <Icon name="upload" />
         <div class="grow">
-          <strong>{isTouch ? T.model.dropTouch : T.model.drop}</strong>
-          <p class="hint">{T.model.kinds}</p>
+          <strong data-tip={T.model.kinds}>{isTouch ? T.model.dropTouch : T.model.drop}</strong>
         </div>
         <div class="row wrap">
           {model && <Button label={T.panel.open} onClick={app.chooseModel} icon="file" />}
@@ -107,6 +106,7 @@ function SampleCard({ app, id, isOpen }: { app: App; id: string; isOpen: boolean
         class="sample"
         data-sample={id}
         aria-current={isOpen ? "true" : undefined}
+        data-tip={tip}
         onClick={() => void app.files.openSample(id)}
       >
         <span class="thumb">
@@ -124,7 +124,6 @@ function SampleCard({ app, id, isOpen }: { app: App; id: string; isOpen: boolean
         </span>
         <span class="grow">
           <strong>{name}</strong>
-          {tip && <span class="hint">{tip}</span>}
         </span>
       </button>
     </li>
@@ -137,22 +136,28 @@ function ModelCard({ app, model }: { app: App; model: ModelInfo }) {
   const some = (n: number) => n > 0 && count(n);
   return (
     <section class="card stack tight" aria-label={T.model.isOpen}>
-      <div class="row">
-        <strong class="grow clip">{model.name}</strong>
+      <strong class="clip">{model.name}</strong>
+      <p class="hint">
+        {[
+          model.splats > 0 && T.model.count.splats(model.splats),
+          model.points > 0 && T.model.count.points(model.points),
+          !isCapture(model) && T.model.count.vertices(model.vertices),
+          alsoThere(model),
+        ]
+          .filter(Boolean)
+          .join(", ")}
+      </p>
+      <Fold title={T.more}>
         <Up app={app} model={model} />
-      </div>
-      <Facts
-        rows={[
-          [T.model.splats, some(model.splats)],
-          [T.model.points, some(model.points)],
-          [T.model.vertices, !isCapture(model) && some(model.vertices)],
-          [T.model.triangles, !isCapture(model) && some(model.triangles)],
-          [T.model.size, size],
-          [T.model.materials, some(model.materials)],
-          [T.model.textures, some(model.textures)],
-          [T.model.also, alsoThere(model)],
-        ]}
-      />
+        <Facts
+          rows={[
+            [T.model.triangles, !isCapture(model) && some(model.triangles)],
+            [T.model.size, size],
+            [T.model.materials, some(model.materials)],
+            [T.model.textures, some(model.textures)],
+          ]}
+        />
+      </Fold>
     </section>
   );
 }

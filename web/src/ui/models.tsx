@@ -33,8 +33,12 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
           </>
         )}
         <div class="row">
-          <Button label={T.models.add} icon="plus" onClick={app.chooseMore} />
-          <p class="hint grow">{isTouch ? T.models.addHintTouch : T.models.addHint}</p>
+          <Button
+            label={T.models.add}
+            icon="plus"
+            tip={isTouch ? T.models.addHintTouch : T.models.addHint}
+            onClick={app.chooseMore}
+          />
         </div>
       </div>
     </Section>

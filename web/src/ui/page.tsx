@@ -12,6 +12,7 @@ import { Hover } from "./hover";
 import { Panel } from "./panel";
 import { See } from "./see";
 import { Overlays } from "./stage";
+import { Timeline } from "./timeline";
 import { attachTips } from "./tips";
 import { Notice, Unsupported, WaysDialog } from "./unsupported";
 import { WorksList } from "./works";
@@ -45,6 +46,7 @@ export function mount({ app, Toasts, Lost, byId }: Parts): void {
     <>
       <Notice app={app} />
       <See app={app} />
+      <Timeline app={app} />
       <Tour app={app} />
       <Dialogs app={app} />
       <Hover app={app} />

@@ -1,5 +1,6 @@
 /** The section Proportions of step Pose: sliders for the parts of a humanoid, presets, and the bones that were found. */
 
+import type { ComponentChildren } from "preact";
 import { useEffect } from "preact/hooks";
 import type { App } from "../app";
 import type { HumanoidInfo } from "../contract";
@@ -10,7 +11,8 @@ import { Button, Fold, Say, Section, Select, Slider, Toggle } from "./controls";
 
 type Facts = (typeof PROPORTIONS)[number];
 
-const GROUPS = Object.keys(T.proportions.groups) as Facts["group"][];
+/** Proportions whose sliders are not folded. */
+const MAIN: ReadonlySet<Facts["name"]> = new Set(["leg", "arm", "torso", "shoulder", "head", "height"]);
 const RANGE = { ...SLIDERS.factor, format: (factor: number) => percent(factor, 0, SLIDERS.factor.max) };
 
 export function Proportions({ app }: { app: App }) {
@@ -26,11 +28,12 @@ export function Proportions({ app }: { app: App }) {
   return (
     <Section title={T.proportions.title}>
       <Presets app={app} />
-      <Sliders app={app} />
-      <Fold title={T.proportions.bones}>
-        <p class="hint">{T.proportions.sources[humanoid.source]}</p>
-        <Bones app={app} humanoid={humanoid} />
-      </Fold>
+      <Sliders app={app}>
+        <Fold title={T.proportions.bones}>
+          <p class="hint">{T.proportions.sources[humanoid.source]}</p>
+          <Bones app={app} humanoid={humanoid} />
+        </Fold>
+      </Sliders>
     </Section>
   );
 }
@@ -54,7 +57,7 @@ function Presets({ app }: { app: App }) {
 /** A slider: the name of its proportion in commands, its title and its value. */
 type Entry = readonly [name: string, title: string, factor: number];
 
-function Sliders({ app }: { app: App }) {
+function Sliders({ app, children }: { app: App; children: ComponentChildren }) {
   const { factors, folds, bound, bindRun, apart, scaled } = app.store.get();
   useEffect(() => void app.proportions.measure(), [bound, bindRun, folds]);
   const sidesOf = (facts: Facts) => {
@@ -78,42 +81,52 @@ function Sliders({ app }: { app: App }) {
     const { min, max } = rangeOf(facts);
     return entries(facts).filter(([, , factor]) => factor < min || factor > max);
   });
+  const sliders = (isMain: boolean) => (
+    <div class="sliders">
+      {PROPORTIONS.filter(({ name }) => MAIN.has(name) === isMain).map((facts) =>
+        entries(facts).map(([name, title, factor]) => (
+          <Slider
+            key={name}
+            label={title}
+            {...RANGE}
+            typed
+            usual={facts.natural}
+            limits={rangeOf(facts)}
+            value={factor}
+            onChange={(value) => app.proportions.set(name, value)}
+            onCommit={() => app.proportions.commit(title)}
+            onReset={() => {
+              app.proportions.set(name, 1);
+              app.proportions.commit(title);
+            }}
+          />
+        )),
+      )}
+    </div>
+  );
   return (
     <>
-      <Toggle label={T.proportions.apart} value={isApart} onChange={app.proportions.apart} />
-      {GROUPS.map((group) => (
-        <fieldset class="field sliders" key={group}>
-          <legend class="legend-text">{T.proportions.groups[group]}</legend>
-          {PROPORTIONS.filter((facts) => facts.group === group).map((facts) =>
-            entries(facts).map(([name, title, factor]) => (
-              <Slider
-                key={name}
-                label={title}
-                {...RANGE}
-                usual={facts.natural}
-                limits={rangeOf(facts)}
-                value={factor}
-                onChange={(value) => app.proportions.set(name, value)}
-                onCommit={() => app.proportions.commit(title)}
-                onReset={() => {
-                  app.proportions.set(name, 1);
-                  app.proportions.commit(title);
-                }}
-              />
-            )),
-          )}
-        </fieldset>
-      ))}
+      {sliders(true)}
+      <p class="hint bands">
+        <span class="natural">{T.proportions.natural}</span>
+        {folds && folds.length > 0 && <span class="folding">{T.proportions.folding}</span>}
+      </p>
       {folded.length > 0 && (
         <p class="hint warn-text">{T.proportions.folds(list(folded.map(([, title]) => title)))}</p>
       )}
-      <Button
-        label={T.proportions.resetAll}
-        icon="reset"
-        tip={T.proportions.resetTip}
-        disabled={!scaled}
-        onClick={() => app.proportions.preset(null)}
-      />
+      {scaled && (
+        <Button
+          label={T.proportions.resetAll}
+          icon="reset"
+          tip={T.proportions.resetTip}
+          onClick={() => app.proportions.preset(null)}
+        />
+      )}
+      <Fold title={T.more}>
+        {sliders(false)}
+        <Toggle label={T.proportions.apart} value={isApart} onChange={app.proportions.apart} />
+        {children}
+      </Fold>
     </>
   );
 }

@@ -12,19 +12,26 @@ import { Badge, Facts, Fold, Say } from "./controls";
  */
 const MAX_INVISIBLE_ERROR = 2.5e-5;
 
-/** Says in one sentence whether the solver converged and how closely the weights reproduce the model at rest. */
-export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
-  const { stopped, invisible, off } = T.report.verdicts;
-  if (!report.converged) return stopped;
-  const { max_rel } = report.rest_error;
-  return max_rel < MAX_INVISIBLE_ERROR ? invisible : off(scientific(max_rel * 100));
+/** Says what a bind has done: its time, how many points follow how many handles, and what is wrong with it. */
+export function sayResult(report: BindReport): string {
+  const { stopped, still, off, outside } = T.report.verdicts;
+  const { vertices, cage_vertices, inner_controls, outside_vertices, converged, rest_error } = report;
+  const { max_rel } = rest_error;
+  return [
+    T.report.plain(report.timings_ms.total, vertices, cage_vertices + inner_controls),
+    max_rel < MAX_INVISIBLE_ERROR ? still : off(percent(max_rel, 2)),
+    !converged && stopped,
+    outside_vertices > 0 && outside(outside_vertices),
+  ]
+    .filter(Boolean)
+    .join(" ");
 }
 
 export function ReportCard({ report }: { report: BindReport }) {
   const good = report.converged && report.outside_vertices === 0;
   const { roundOff, converged, notConverged } = T.report;
   return (
-    <section class="card stack" aria-label={T.report.name}>
+    <section class="stack" aria-label={T.report.name}>
       <div class="row">
         <strong class="grow">{T.report.boundIn(report.timings_ms.total)}</strong>
         <Badge
@@ -33,21 +40,23 @@ export function ReportCard({ report }: { report: BindReport }) {
           text={report.at_round_off ? roundOff : report.converged ? converged : notConverged}
         />
       </div>
-      <p class="hint">{verdict(report)}</p>
       <Facts
         rows={[
           [T.report.method, `${T.report.methods[report.method]}, ${T.report.solvers[report.solver]}`],
           [T.report.grid, T.report.cells(report.dims.join(" × "), report.grid_reason)],
           [T.report.computedOn, report.backend === "gpu" ? T.report.gpu(report.adapter) : T.report.cpu],
-          [T.report.restMean, scientific(report.rest_error.mean_rel)],
-          [T.report.restLargest, scientific(report.rest_error.max_rel)],
-          ...rawFacts(T.report.solverError, report.raw_error?.point_rel),
-          [T.report.weights, T.report.range(scientific(report.weights.min), scientific(report.weights.max))],
         ]}
       />
       <Fold title={T.report.allNumbers}>
         <Facts
           rows={[
+            [T.report.restMean, scientific(report.rest_error.mean_rel)],
+            [T.report.restLargest, scientific(report.rest_error.max_rel)],
+            ...rawFacts(T.report.solverError, report.raw_error?.point_rel),
+            [
+              T.report.weights,
+              T.report.range(scientific(report.weights.min), scientific(report.weights.max)),
+            ],
             [T.report.iterations, count(report.iterations)],
             [T.report.threshold, scientific(report.tau)],
             [T.report.inside, count(report.cells.interior)],

@@ -6,7 +6,7 @@ import type { Coordinates } from "../contract";
 import { COORDINATES } from "../defaults";
 import { isCapture } from "../derived";
 import { T } from "../words";
-import { fieldsOf, IconButton, Section, Segments, SHARES, Slider, Toggle } from "./controls";
+import { fieldsOf, IconButton, Section, Segments, SHARES, Slider, switchOf, Toggle } from "./controls";
 
 export function See({ app }: { app: App }) {
   if (!app.store.get().seeOpen) return null;
@@ -38,10 +38,11 @@ function Colours({ app }: { app: App }) {
       <Segments
         label={T.see.colour}
         labels={T.see.colours}
+        tips={T.see.about}
         disabled={bound ? [] : ["weight", "error"]}
         {...option("colour")}
       />
-      <p class="hint">{needsVertex ? T.see.selectForWeights : T.see.about[scene.colour]}</p>
+      {needsVertex && <p class="hint">{T.see.selectForWeights}</p>}
       {scene.colour === "weight" && (
         <Toggle label={T.see.toOne} sentence={T.see.toOneSentence} {...option("weights_to_one")} />
       )}
@@ -58,7 +59,9 @@ export function Comparison({ app }: { app: App }) {
     COORDINATES.filter((other) => (other === kind) !== compare.includes(other));
   return (
     <fieldset class="field">
-      <legend class="legend-text">{T.see.compare}</legend>
+      <legend class="legend-text" data-tip={T.see.compareSentence}>
+        {T.see.compare}
+      </legend>
       <div class="segments">
         {COORDINATES.map((kind) => (
           <label key={kind}>
@@ -75,7 +78,6 @@ export function Comparison({ app }: { app: App }) {
           </label>
         ))}
       </div>
-      <p class="hint">{T.see.compareSentence}</p>
     </fieldset>
   );
 }
@@ -121,12 +123,16 @@ export function SlicePosition({ app }: { app: App }) {
 function Parts({ app }: { app: App }) {
   const option = fieldsOf(app.store.get().scene, app.view.scene);
   const parts = Object.keys(T.see.parts) as (keyof typeof T.see.parts)[];
+  const joints = switchOf(option("joints"), "follow", null);
   return (
     <div class="stack tight">
       {parts.map((part) => {
         const [label = "", sentence = ""] = T.see.parts[part];
         return <Toggle key={part} label={label} sentence={sentence} {...option(part)} />;
       })}
+      {(app.store.get().model?.joints ?? 0) > 0 && (
+        <Toggle label={T.clips.joints} sentence={T.clips.jointsSentence} {...joints} />
+      )}
       <Floaters app={app} />
     </div>
   );

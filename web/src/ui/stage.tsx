@@ -20,7 +20,7 @@ import { useTouch } from "./touch";
 
 /** All overlays of the view. Sets `data-rest` and `data-painting` on `stage` for the style sheet. */
 export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
-  const { model, cage, scene, editingRest, painting } = app.store.get();
+  const { model, cage, scene, editingRest, painting, tools, gesture } = app.store.get();
   useLayoutEffect(() => {
     stage.toggleAttribute("data-rest", editingRest);
     stage.toggleAttribute("data-painting", painting !== null);
@@ -39,6 +39,7 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
       {cage && <Tools app={app} />}
       {model && <Axes app={app} />}
       {asksToPull(app.store.get()) && <Cue app={app} />}
+      {tools.proportionalOn && gesture !== null && <Reach app={app} />}
       {isComparison(scene.compare) && (
         <div class="compare-labels" aria-hidden="true">
           {scene.compare.map((kind) => (
@@ -205,6 +206,19 @@ function Cue({ app }: { app: App }) {
       <span>{T.view.cue}</span>
     </div>
   );
+}
+
+/** Circle around the selection within which vertices follow a gesture. */
+function Reach({ app }: { app: App }) {
+  const element = useRef<HTMLDivElement>(null);
+  useFrames(app, (engine) => {
+    const [right = 0, down = 0, radius = 0] = engine.reachCircle();
+    if (!element.current) return;
+    element.current.hidden = radius === 0;
+    element.current.style.translate = `${right}px ${down}px`;
+    element.current.style.width = `${2 * radius}px`;
+  });
+  return <div class="reach" aria-hidden="true" ref={element} />;
 }
 
 /** Progress of opening a file, with a button to cancel. For a large model, also asks whether to continue. */

@@ -19,6 +19,7 @@ export function underWay(state: AppState): string | null {
   if (state.placing) return T.status.placing[state.placing];
   if (state.painting) return T.models.painting;
   if (state.boxArmed) return T.status.boxArmed;
+  if (state.hoversAlone) return T.pose.movesAlone;
   if (state.playing) return T.status.playing(state.playingPose ?? T.status.rest);
   if (cageBroken(state)) return T.status.broken;
   if (isCapture(state.model) && state.bound && !state.lattice) return T.status.capture;

@@ -66,6 +66,12 @@ export function createToasts() {
       problems.value = [];
       said.value = said.value.filter(({ fixes }) => !isQuestion(fixes));
     },
+    closeLatest() {
+      const lists = [said, problems];
+      const ids = lists.flatMap((list) => list.value.map(({ id }) => id));
+      for (const list of lists) close(list, Math.max(...ids));
+      return ids.length > 0;
+    },
   };
 
   return {

@@ -28,15 +28,20 @@ export function Toolbar({ label, kind, children }: ToolbarProps) {
     }
   };
 
-  useLayoutEffect(() => {
+  const keepStop = () => {
     const all = buttons();
     stopAt(all.find((button) => button === stop.current) ?? all[0]);
-  });
+  };
+  useLayoutEffect(keepStop);
   useLayoutEffect(() => {
     const { current } = element;
     if (!current) return;
     // The style sheet determines whether the toolbar is a row or a column.
-    const observer = new ResizeObserver(() => setColumn(current.clientHeight > current.clientWidth));
+    const observer = new ResizeObserver(() => {
+      setColumn(current.clientHeight > current.clientWidth);
+      // In a low view the style sheet hides the toolbar, and buttons that are not visible are no tab stops.
+      keepStop();
+    });
     observer.observe(current);
     return () => observer.disconnect();
   }, []);

@@ -1,6 +1,8 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createEdit } from "../../src/actions/edit";
+import { createPlayer } from "../../src/actions/player";
 import { createPoses, freshName, snapshotCage } from "../../src/actions/poses";
+import { createWalk } from "../../src/actions/walk";
 import { cageOf, createFake } from "../fake";
 
 beforeEach(() => {
@@ -16,7 +18,9 @@ const POINT = [9, 9, 9];
 /** A page with one saved pose and a cage of two vertices, both of them moved to (1, 1, 1). */
 function page() {
   const fake = createFake();
-  const poses = createPoses(fake.ctx, createEdit(fake.ctx));
+  const edit = createEdit(fake.ctx);
+  const player = createPlayer(fake.ctx, edit);
+  const poses = createPoses(fake.ctx, edit, player, createWalk(fake.ctx, edit, player));
   fake.showCage(cageOf(2));
   fake.engine.setCagePositions(new Float32Array(6).fill(1));
   fake.engine.commit("Move");
@@ -40,7 +44,7 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   poses.move(1, 0);
   expect(poses.time(0, 0.4)).toBe(true);
   poses.interpolation(0, "step");
-  const transition = { interpolation: "cubic", loops: false, back: 1 } as const;
+  const transition = { name: "Wave", interpolation: "cubic", loops: false, back: 1 } as const;
   poses.transition(transition);
   expect(commands).toEqual([
     { do: "save_pose", name: "Pose 2" },
@@ -102,13 +106,37 @@ it("an animation that does not loop ends with the pose before it", () => {
     frame = step;
     return 1;
   });
-  const shown = { interpolation: "linear", back: 1 } as const;
+  const shown = { name: "", interpolation: "linear", back: 1 } as const;
   show({ animationSeconds: 1, transition: { ...shown, loops: false } });
   poses.togglePlay();
   frame(performance.now() + 500);
   expect([store.get().playing, store.get().playingPose]).toEqual([true, "Pose 1"]);
   frame(performance.now() + 2000);
   expect([store.get().playing, calls.at(-1)]).toEqual([false, "revert"]);
+});
+
+it("an animation plays from the playhead at the speed of the timeline, and a loop starts again", () => {
+  const { poses, engine, show, store, teach } = page();
+  let frame: (now: number) => void = () => undefined;
+  vi.stubGlobal("requestAnimationFrame", (step: typeof frame) => {
+    frame = step;
+    return 1;
+  });
+  const now = vi.spyOn(performance, "now").mockReturnValue(0);
+  const shown: number[] = [];
+  teach({ playAt: (seconds) => shown.push(seconds) });
+  show({ animationSeconds: 2, transition: { name: "", interpolation: "linear", back: 1, loops: true } });
+  poses.scrub(0.5);
+  poses.keepMoment();
+  store.set({ clip: { ...store.get().clip, speed: 0.5 } });
+  poses.togglePlay();
+  frame(1000);
+  frame(4000);
+  // 0.5 s + 0.5 * 1 s = 1 s, and 1 s + 0.5 * 3 s = 2.5 s, which is 0.5 s after the loop of 2 s.
+  expect(shown).toEqual([0.5, 1, 0.5]);
+  poses.togglePlay();
+  expect([store.get().moment, engine.cagePositions()[0]]).toEqual([0.5, 1]);
+  now.mockRestore();
 });
 
 it("poses of a previous cage are carried over as one step", async () => {

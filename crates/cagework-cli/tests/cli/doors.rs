@@ -90,7 +90,7 @@ fn saved_poses_are_the_same_morph_targets_through_command_and_page() {
     page.editor.apply(Command::SavePose { name: "rest".into() }).unwrap();
     for (name, options, plain) in [("poses.glb", "", false), ("static.glb", "--static", true)] {
         let request = RigOptions { plain, ..RigOptions::default() };
-        let bytes = page.with(|all| all.poses(0, &request)).unwrap().bytes;
+        let bytes = page.with(|all| all.poses(0, &request, false, "poses")).unwrap().bytes;
         let poses = "--pose wide.obj --name wide --pose cage.obj --name rest";
         sandbox.run(&format!("{DEFORM} {poses} {options} -o {name}")).success();
         assert!(sandbox.read(name) == bytes, "{name}");

@@ -431,7 +431,7 @@ impl Renderer {
         let palette = self.scene.view.theme.palette();
         let viewport = size.map(|s| s as f32);
         let radius = (0.5 * self.floor.diagonal()).max(f32::MIN_POSITIVE);
-        let middle = self.floor.center().with_y(self.floor.min.y);
+        let middle = self.floor.center().with_y(self.floor.min.y + self.scene.floor_height);
         Uniform {
             clip_from_world: camera.clip_from_world().to_cols_array_2d(),
             view_from_world: camera.view_from_world().to_cols_array_2d(),

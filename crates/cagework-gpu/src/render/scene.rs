@@ -100,6 +100,8 @@ pub struct SceneOptions {
     pub joints: Marks,
     /// Edges of a cage that is previewed, as segments.
     pub draft: Marks,
+    /// Height of the floor above the lowest point of the model at rest, object units.
+    pub floor_height: f32,
 }
 
 impl Default for SceneOptions {
@@ -122,6 +124,7 @@ impl Default for SceneOptions {
             held: Marks::default(),
             joints: Marks::default(),
             draft: Marks::default(),
+            floor_height: 0.0,
         }
     }
 }

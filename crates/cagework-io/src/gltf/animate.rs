@@ -74,9 +74,9 @@ pub(crate) struct PoseClip<'a> {
 }
 
 impl<'a> PoseClip<'a> {
-    /// A clip named "poses", added to the animations of the document.
+    /// A clip with the name of the timeline, added to the animations of the document.
     pub(crate) fn of(timeline: &'a Timeline) -> Self {
-        Self { name: "poses", timeline, is_alone: false }
+        Self { name: timeline.name(), timeline, is_alone: false }
     }
 }
 

@@ -93,7 +93,8 @@ impl Engine {
     }
 
     /// Exports a model as GLB with a morph target for each saved pose of the cage and the animation that `playAt`
-    /// shows.
+    /// shows. `in_pose`: the model has the shape of the current pose; otherwise it stays at rest. `name`: name of
+    /// the animation.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -102,9 +103,11 @@ impl Engine {
         &self,
         id: u32,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
+        in_pose: bool,
+        name: &str,
     ) -> Answer<Vec<u8>> {
         let options = decode(options)?;
-        self.export(|state| state.bound_document().poses(id, &options))
+        self.export(|state| state.bound_document().poses(id, &options, in_pose, name))
     }
 
     /// Exports the posed cage as OBJ.

@@ -146,7 +146,29 @@ impl Engine {
         })
     }
 
-    /// Moves the cage to its pose at a time, in seconds, of the animation of the saved poses.
+    /// Whether a vertex of the cage has no mirror image, so that it moves alone while editing is symmetric.
+    #[wasm_bindgen(js_name = movesAlone)]
+    pub fn moves_alone(&self, vertex: u32) -> bool {
+        self.read(|state| state.editor.tools().symmetry && state.editor.symmetry().partner(vertex).is_none())
+    }
+
+    /// Centre of the selection and radius of proportional editing around it, CSS pixels: x, y, radius. Empty while
+    /// proportional editing is off or no gesture is in progress.
+    #[wasm_bindgen(js_name = reachCircle)]
+    pub fn reach_circle(&self) -> Vec<f32> {
+        self.read(|state| {
+            let (reach, center) = (state.editor.reach(), state.editor.selection.center(state.pose()));
+            let Some(center) = center.filter(|_| reach > 0.0 && state.editor.gesture().is_some()) else {
+                return Vec::new();
+            };
+            let radius = reach / state.camera.units_per_pixel(center);
+            let at = state.camera.project(center).map(|image| image.position);
+            at.map_or_else(Vec::new, |at| vec![at.x, at.y, radius])
+        })
+    }
+
+    /// Moves the cage to its pose at a time, in seconds, of the animation of the saved poses, and sets the shares of
+    /// the poses.
     #[wasm_bindgen(js_name = playAt)]
     pub fn play_at(&self, seconds: f32) {
         self.change(|state| state.editor.play_at(seconds));

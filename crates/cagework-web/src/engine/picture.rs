@@ -2,7 +2,7 @@
 
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
 use cagework_gpu::Session;
-use cagework_gpu::render::DrawModel;
+use cagework_gpu::render::{DrawModel, MeshStyle};
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -92,7 +92,7 @@ impl Engine {
     /// # Errors
     /// If the GPU device is lost, or the picture is too large.
     pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Answer<Vec<u8>> {
-        self.render_picture([width, height], alone, None).await
+        self.render_picture([width, height], if alone { Subject::Model } else { Subject::Scene }).await
     }
 
     /// Renders the model in a saved pose, without the frame of a clip, on a transparent background. RGBA pixels, rows
@@ -103,7 +103,17 @@ impl Engine {
     /// or while the cage is uploaded.
     #[wasm_bindgen(js_name = posePicture)]
     pub async fn pose_picture(&self, width: u32, height: u32, index: u32) -> Answer<Vec<u8>> {
-        self.render_picture([width, height], true, Some(index as usize)).await
+        self.render_picture([width, height], Subject::Pose(index as usize)).await
+    }
+
+    /// Renders the model with the colours of one weight on a transparent background. `column`: index of the cage vertex
+    /// or inner control. RGBA pixels, rows from the top. `[height, width, 4]`
+    ///
+    /// # Errors
+    /// If the GPU device is lost, or the picture is too large. `Missing` before a bind.
+    #[wasm_bindgen(js_name = weightPicture)]
+    pub async fn weight_picture(&self, width: u32, height: u32, column: u32) -> Answer<Vec<u8>> {
+        self.render_picture([width, height], Subject::Weight(column)).await
     }
 
     /// Reads from the GPU the vertices deformed with one kind of coordinates. `[n_vertices, 3]`
@@ -127,17 +137,40 @@ impl Engine {
     }
 }
 
+/// What a picture shows.
+enum Subject {
+    /// The scene of the view.
+    Scene,
+    /// The model.
+    Model,
+    /// The model in the saved pose with this index.
+    Pose(usize),
+    /// The model, coloured by the weights of this control.
+    Weight(u32),
+}
+
 impl Engine {
-    async fn render_picture(&self, size: [u32; 2], alone: bool, pose: Option<usize>) -> Answer<Vec<u8>> {
+    async fn render_picture(&self, size: [u32; 2], subject: Subject) -> Answer<Vec<u8>> {
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let scale = {
             let mut state = self.state.borrow_mut();
             gpu.take(&mut state);
-            if let Some(index) = pose {
+            if let Subject::Pose(index) = subject {
                 state.write_saved_pose(index, &mut gpu.main)?;
+                // The next frame writes the camera of the view again.
+                if let Some(pose) = state.editor.document().poses.get(index) {
+                    gpu.main.camera_mut().frame_points(&pose.positions);
+                }
             }
-            let scene = state.picture_scene(alone);
+            let mut scene = state.picture_scene(!matches!(subject, Subject::Scene));
+            if let Subject::Weight(column) = subject {
+                state.bound_document().require_bound()?;
+                if column as usize >= state.pose().len() {
+                    return Err(Fault::missing("such control", "choose another one"));
+                }
+                scene.mesh = MeshStyle::Weights { column };
+            }
             gpu.main.set_scene(scene);
             size[1] as f32 / state.size.y
         };

@@ -1312,6 +1312,10 @@ compare: Array<Coordinates>, problems: boolean,
  */
 joints: Joints | null,
 /**
+ * Whether exports keep the models on their ground, so that the floor is drawn below the posed models.
+ */
+ground: boolean,
+/**
  * Colours of background and overlays.
  */
 theme: Theme,
@@ -1457,9 +1461,13 @@ proportional: number,
  */
 proportionalOn: boolean, };
 /**
- * How the animation of the saved poses goes from one to the next, and how it ends.
+ * Name of the animation of the saved poses, how it goes from one to the next, and how it ends.
  */
 export type Transition = {
+/**
+ * Name of the clip in exported files; empty if the user has not named it.
+ */
+name: string,
 /**
  * Interpolation towards poses that have none of their own, and of the return to the start.
  */
@@ -1518,7 +1526,11 @@ poses: Array<PoseView>,
  */
 shares: Array<number>,
 /**
- * How the animation of the saved poses goes from one to the next, and how it ends.
+ * Whether the pose differs from the blend of the saved poses by `shares`.
+ */
+modified: boolean,
+/**
+ * Name of the animation of the saved poses, how it goes from one to the next, and how it ends.
  */
 transition: Transition,
 /**
@@ -1620,8 +1632,8 @@ nonzeros: number, };
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":0,"method":"embedded","solver":"multigrid","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"kind":"auto","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"plain":false,"dynamic":false,"ground_off":false};
-export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":[],"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
-export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
+export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"cageId":0,"poses":[],"shares":[],"modified":false,"transition":{"name":"","interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"factors":[],"preset":null,"scaled":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null,"ground":false};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
 export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "fbx", "obj", "ply", "stl", "off", "3mf", "splat", "spz", "sog"] as const;

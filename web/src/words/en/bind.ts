@@ -4,16 +4,18 @@ import { bytes, duration, plural, scientific } from "../../format";
 
 export const bind = {
   title: "Bind the model to its cage",
-  sentence:
-    "Binding computes how strongly each cage vertex moves each point of the model, on a grid inside the cage. These numbers are the weights (harmonic coordinates).",
-  how: "How it is computed",
+  sentence: "After the bind, the model follows its cage.",
+  how: "How it works",
+  fineness: "Fineness",
+  finenessTip: "Finer takes longer and separates parts that are closer together.",
+  finenesses: ["Coarse", "Medium", "Fine", "Very fine"],
+  cells: (name: string, cells: number | undefined) => `${name} (${cells} cells)`,
+  weight: (i: number) => `Bright areas follow handle ${i} of the cage; dark areas do not.`,
   ours: "Ours",
   oursTip: "Exact at the cage's surface, fast solver",
   published: "Published",
   publishedTip: "Joshi et al. (2007), as K. Smith describes it: rectangular cells and Jacobi sweeps",
-  grid: "Grid cells along the longest side",
   auto: "Auto",
-  gridEach: "Grid cells along each side",
   method: "Method",
   methods: { embedded: "Embedded", classic: "Classic" },
   methodTips: {
@@ -48,11 +50,11 @@ export const bind = {
   },
   stages: {
     simplify: "Making a cage",
-    voxelize: "Classifying grid cells",
-    solve: "Solving for the coordinates",
-    sample: "Sampling weights",
+    voxelize: "Measuring the space inside the cage",
+    solve: "Computing the weights",
+    sample: "Reading the weights of each point",
   },
-  coarseFirst: ", coarse grid first",
+  coarseFirst: ", a coarse version first",
   underWay: "Bind in progress",
   progress: "Bind",
   working: "Estimating the time left",
@@ -86,6 +88,8 @@ export const report = {
   short: { embedded: "Embedded", classic: "Classic" },
   solvers: { multigrid: "multigrid", jacobi: "Jacobi", cg: "conjugate gradients" },
   backends: { gpu: "GPU", cpu: "CPU" },
+  plain: (ms: number, points: number, handles: number) =>
+    `Bound in ${duration(ms)}: each of the ${plural(points, "point")} follows the ${plural(handles, "handle")} of the cage.`,
   boundIn: (ms: number) => `Bound in ${duration(ms)}`,
   roundOff: "At 32-bit precision",
   converged: "Converged",
@@ -93,11 +97,10 @@ export const report = {
   gpu: (adapter: string | null | undefined) => (adapter ? `GPU (${adapter})` : "GPU"),
   cpu: "processor",
   verdicts: {
-    stopped: "Stopped at the iteration limit. Raise it to get converged weights.",
-    invisible:
-      "With the cage at rest, no vertex moves visibly. After the solve, each vertex's weights are corrected so that they sum to 1 and reproduce its position. The solver error is the size of that correction.",
-    off: (percents: string) =>
-      `With the cage at rest, the model is off by up to ${percents} % of the cage's size.`,
+    still: "At rest nothing moves.",
+    off: (share: string) => `At rest, points are off by up to ${share} of the cage's size.`,
+    stopped: "It stopped before it was exact: raise the iteration limit below.",
+    outside: (n: number) => `${plural(n, "point lies", "points lie")} outside the cage.`,
   },
   method: "Method",
   grid: "Grid",

@@ -28,7 +28,6 @@ export const cage = {
   within: (share: string) => `within ${share} of the model's size`,
   quads: "Quads",
   quadsSentence: "Four-sided faces where two triangles make a good one.",
-  ofQuads: "Quads",
   margin: "Margin around the model",
   tight: "as tight as possible",
   ofSize: (share: string) => `${share} of the model's size`,
@@ -74,7 +73,6 @@ export const cage = {
   openControls: "From a file",
   moveThem: (key: string) =>
     `Drag them like cage vertices. While you edit the cage (${key} in the view), dragging moves their rest position; otherwise it poses the model.`,
-  shape: "Shape it",
   reshape: "Edit the cage",
   reshapeSentence: (key: string) =>
     `Edit the cage itself (${key} in the view). The model stays still and is bound again afterwards.`,
@@ -101,8 +99,8 @@ export const cage = {
   partOutside: "Part of the model is outside.",
   preview: (n: number) => `The view shows a preview with ${plural(n, "vertex", "vertices")}.`,
   vertices: (n: number) => plural(n, "vertex", "vertices"),
-  edges: "Edges",
-  faces: "Faces",
+  facts: (faces: number, quads: string, edges: number) =>
+    `${plural(faces, "face")}, ${quads} of them quads; ${plural(edges, "edge")}`,
   posesWait: (saved: number) =>
     saved > 0
       ? "Saved poses fit only the previous cage. Go back to that cage, or carry them over."

@@ -3,26 +3,18 @@
 import { plural } from "../../format";
 
 export const clips = {
-  title: "Animation",
-  clip: "Clip",
-  rest: "None: pose with the cage",
+  rest: "No clip",
   named: (name: string, length: string) => `${name}, ${length}`,
-  playing: "Pause the clip to pose it with the cage.",
-  paused: "Drag a handle of the cage. The pose applies to the whole clip; the view shows this frame.",
   play: "Play the clip",
   pause: "Pause the clip",
-  time: "Time",
   seconds: (seconds: number) => `${seconds.toFixed(2)} s`,
-  speed: "Speed",
-  loop: "Loop",
-  targets: (n: number) => plural(n, "morph target"),
   follow: "Joints follow the cage",
   followSentence: "Off: the skeleton does not change, so other files made for it still fit.",
   joints: "Show joints",
   jointsSentence: "A dot for a joint inside the cage, a ring for one outside.",
   rigid: (kept: number, all: number) => `Parts that keep their shape (${kept} of ${all})`,
   rigidSentence: "For buckles, eyes or weapons: each moves with its joint and does not bend.",
-  advanced: "More joint options",
+  advanced: "More options",
   turn: "Bones turn with the shape",
   turnSentence:
     "For a cage that poses the model, for example raises an arm: joints turn too, and rotations in clips are adapted.",

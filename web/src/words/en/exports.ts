@@ -4,7 +4,7 @@ import { bytes, list, plural } from "../../format";
 
 export const exports = {
   title: "Export",
-  sentence: "Files for Blender, Unity, Unreal, three.js, Python and this page.",
+  more: "More files",
   items: {
     glb: ["Posed model", "GLB of the model in this pose, with its parts, materials and textures."],
     shape: [

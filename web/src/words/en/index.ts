@@ -11,6 +11,7 @@ import { models } from "./models";
 import { did, gesture, pose, pull } from "./pose";
 import { proportions } from "./proportions";
 import { legend, see } from "./see";
+import { timeline } from "./timeline";
 import { eta, hints, keys, status, toast, view } from "./view";
 import { walk } from "./walk";
 import { without } from "./without";
@@ -20,6 +21,8 @@ const words = {
   product: "Cagework",
   privacy: "Your files never leave this computer: everything is computed in this page.",
   close: "Close",
+  more: "More",
+  percentOf: (what: string) => `${what}, percent`,
   cancel: "Cancel",
   tryAgain: "Try again",
   reload: "Reload the page",
@@ -60,6 +63,7 @@ const words = {
   eta,
   keys,
   tour,
+  timeline,
 };
 
 export const EN = {

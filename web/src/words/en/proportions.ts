@@ -10,7 +10,6 @@ export const proportions = {
     slim: "Slim",
     stout: "Stout",
   },
-  groups: { Limbs: "Limbs", Trunk: "Trunk", "Head and height": "Head and height" },
   titles: {
     leg: "Legs",
     arm: "Arms",
@@ -30,6 +29,8 @@ export const proportions = {
   apart: "Left and right apart",
   resetAll: "Reset all",
   resetTip: "All proportions to 100 %. A double click on a slider resets only that slider.",
+  natural: "looks natural",
+  folding: "folds",
   folds: (parts: string) => `Beyond the red mark the model folds: ${parts}`,
   bones: "Bones",
   unknown: "No proportions: unknown skeleton",

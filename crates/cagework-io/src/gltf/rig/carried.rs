@@ -15,7 +15,7 @@ const LEAST: f32 = 0.999;
 impl Rig<'_> {
     /// Whether each vertex belongs to a connected piece that hangs on one hand alone. All are false for models that are
     /// no humanoids, and for those of which nothing else would be left. `[n_vertices]`
-    pub(super) fn carried_in_hands(&self, triangles: &[[u32; 3]]) -> Vec<bool> {
+    pub(crate) fn carried_in_hands(&self, triangles: &[[u32; 3]]) -> Vec<bool> {
         let none = || vec![false; self.n_vertices];
         let Ok(Some(rest)) = rest_rig(self.document, self.origin) else { return none() };
         let Ok(humanoid) = Humanoid::of_rig(&rest, &[]) else { return none() };

@@ -43,7 +43,8 @@ impl Ground {
     }
 
     /// Height by which the models are lifted.
-    pub(crate) fn lift(&self) -> f64 {
+    #[must_use]
+    pub fn lift(&self) -> f64 {
         self.rest.map_or(0.0, |[before, after]| before - after)
     }
 

@@ -233,6 +233,6 @@ fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, tim
     push(
         &mut edit.json,
         "animations",
-        json!({ "name": "poses", "samplers": samplers, "channels": channels }),
+        json!({ "name": timeline.name(), "samplers": samplers, "channels": channels }),
     );
 }

@@ -287,7 +287,7 @@ pub(crate) fn skeleton(
 impl Rig<'_> {
     /// Finds the heights of the lowest visible vertex at rest, before and after the deformation. Ignores vertices that
     /// are `carried`. `[n_vertices]`
-    fn ground(&self, by: &[DVec3], carried: &[bool], up: DVec3) -> Ground {
+    pub(crate) fn ground(&self, by: &[DVec3], carried: &[bool], up: DVec3) -> Ground {
         let mut lows = [f64::INFINITY; 2];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {
             let own = part.rest().into_iter().zip(&by[part.first..]).zip(&carried[part.first..]);
