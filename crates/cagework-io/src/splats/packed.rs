@@ -4,7 +4,6 @@
 use cagework_core::splats::n_harmonics;
 use glam::{DVec3, Vec3};
 
-use super::ply::degree_of;
 use super::{RawSplats, SplatError, SplatOrder, rotation_of};
 use crate::order::Budget;
 use crate::ply::table::{Element, Header, Row};
@@ -31,6 +30,17 @@ const COLOR_RANGES: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "m
 const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 /// Spherical harmonics are stored from -4 to 4.
 const MAX_HARMONIC: f32 = 4.0;
+
+/// Degree of the spherical harmonics in the properties `f_rest_*` of an element.
+pub(super) fn degree_of(element: &Element) -> Result<u8, SplatError> {
+    let n = element.columns.iter().filter(|column| column.name.starts_with("f_rest_")).count();
+    let degree = (0..=3).find(|&degree| 3 * n_harmonics(degree) == n);
+    degree.ok_or_else(|| {
+        SplatError::Damaged(format!(
+            "it has {n} properties f_rest_*, but spherical harmonics of degree 0 to 3 have 0, 9, 24 or 45"
+        ))
+    })
+}
 
 /// Ranges of a chunk: `[position, logarithm of the scale, colour][lowest, highest]`.
 type Ranges = [[DVec3; 2]; 3];

@@ -44,20 +44,9 @@ fn names(n_harmonics: usize) -> impl Iterator<Item = String> {
     named(&POSITION).chain(named(&COLOR)).chain(rest).chain(named(&SHAPE))
 }
 
-/// Degree of the spherical harmonics in the properties `f_rest_*` of an element.
-pub(super) fn degree_of(element: &Element) -> Result<u8, SplatError> {
-    let n = element.columns.iter().filter(|column| column.name.starts_with("f_rest_")).count();
-    let degree = (0..=3).find(|&degree| 3 * n_harmonics(degree) == n);
-    degree.ok_or_else(|| {
-        SplatError::Damaged(format!(
-            "it has {n} properties f_rest_*, but spherical harmonics of degree 0 to 3 have 0, 9, 24 or 45"
-        ))
-    })
-}
-
 /// Finds the columns of the properties [`names`].
 fn columns(vertex: &Element) -> Result<Vec<usize>, SplatError> {
-    let n = n_harmonics(degree_of(vertex)?);
+    let n = n_harmonics(packed::degree_of(vertex)?);
     let find = |name: String| {
         let missing = if name.starts_with("f_rest_") {
             SplatError::Damaged(format!("it has {} properties f_rest_*, but no {name}", 3 * n))
@@ -93,7 +82,8 @@ fn read_table(
     budget: &mut Budget,
 ) -> Result<RawSplats, SplatError> {
     let columns = columns(vertex)?;
-    let order = SplatOrder { count: vertex.count, degree: degree_of(vertex)?, ..SplatOrder::default() };
+    let order =
+        SplatOrder { count: vertex.count, degree: packed::degree_of(vertex)?, ..SplatOrder::default() };
     let mut raw = RawSplats::new(&order.permit(budget)?);
     let (mut rows, mut row) = (header.rows(bytes), Row::default());
     for element in &header.elements {
