@@ -121,7 +121,8 @@ export const opening = {
   get kinds() {
     return `Cagework opens ${endings("conjunction")} files.`;
   },
-  companions: "These files belong to a .gltf, .fbx, .obj or meta.json file. Open that file together with them.",
+  companions:
+    "These files belong to a .gltf, .fbx, .obj or meta.json file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
     const what =
