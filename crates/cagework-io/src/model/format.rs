@@ -319,12 +319,6 @@ impl ModelFormat {
         }
     }
 
-    /// Whether files of this format are written, not only read.
-    #[must_use]
-    pub fn is_written(self) -> bool {
-        !self.facts().read_only.contains(&self.export_extension())
-    }
-
     pub(crate) fn keeps(self, what: ModelProperty) -> bool {
         self.facts().keeps.contains(&what)
     }
