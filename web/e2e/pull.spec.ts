@@ -62,11 +62,13 @@ test("points of the model are pulled and pinned", { tag: "@story" }, async ({ pa
     await expect(page.getByText("1 pin on the model")).toBeVisible();
     await unfold(page);
     await page.getByText("The whole model follows").click();
+    // The timeline of step Pose has made the view smaller.
+    const before = await placeOf(page, pinned.point);
     const at = await grip(page, [0.35, 0.45]);
     await pull(page, at, -30, -40);
     await rested(page);
     const now = await placeOf(page, pinned.point);
-    expect(Math.hypot(now.x - pinned.x, now.y - pinned.y), "the pin").toBeLessThan(3);
+    expect(Math.hypot(now.x - before.x, now.y - before.y), "the pin").toBeLessThan(3);
     const far = await cagePositions(page);
     expect(largestMove(rest, far)).toBeGreaterThan(0.05);
     await shoot(page, "pull-pinned");

@@ -356,7 +356,7 @@ fn an_export_in_the_pose_plays_what_the_page_plays() {
     let all =
         |editor| BoundDocument { editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
     let (id, options) = (editor.document().models.first().unwrap().id, RigOptions::default());
-    let read = |bytes: Vec<u8>| Model::read("a.glb", bytes, &mut |_| None).unwrap();
+    let read = |bytes: Vec<u8>| Model::read("a.glb", &bytes, &mut |_| None).unwrap();
     let posed = read(all(&editor).glb(id, &options, None).unwrap().bytes);
     let animated = read(all(&editor).poses(id, &options, true, "Wave").unwrap().bytes);
     assert_eq!(animated.positions, posed.positions);
@@ -394,7 +394,7 @@ fn the_lift_of_the_view_is_that_of_exports_and_clips() {
     let mut options = RigOptions::default();
     options.reshape.ground = true;
     let glb = all.glb(models.first().unwrap().id, &options, None).unwrap().bytes;
-    let exported = Model::read("a.glb", glb, &mut |_| None).unwrap();
+    let exported = Model::read("a.glb", &glb, &mut |_| None).unwrap();
     assert!((low(&exported.positions) - rest).abs() < 10.0 * ROUNDING);
     let playback = Playback::new(all, options).unwrap();
     assert!((low(&playback.positions()) - rest).abs() < 10.0 * ROUNDING);
