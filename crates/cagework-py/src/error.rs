@@ -54,6 +54,7 @@ pub(crate) fn job(error: JobError) -> PyErr {
         | JobError::Unbound
         | JobError::Select(_)
         | JobError::Memory { .. }
+        | JobError::Read(_)
         | JobError::Write(_) => model(error),
     }
 }

@@ -9,7 +9,6 @@ use crate::licences;
 use crate::npm::{self, exec};
 use crate::wasm::{self, target_folder};
 
-const PACKAGE: &str = "web/package";
 /// Folder for the licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
 /// Folders whose files are copied into the blank project, each with the folder to copy to.
