@@ -79,7 +79,7 @@ describe("dropped files", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
       sentence:
-        "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, .spz, and .sog files.",
+        "Cagework opens .glb, .vrm, .gltf, .fbx, .obj, .ply, .stl, .off, .3mf, .splat, .spz, and .sog files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

@@ -7,9 +7,9 @@ use serde_json::json;
 use ufbx::{AnimStack, BakeOpts, BakedAnim, BakedAnimRoot, BakedQuat, BakedVec3, Scene};
 
 use crate::document::Document;
+use crate::limits::{FbxError, Shares};
 use crate::mesh::Morphed;
 use crate::node::{Nodes, rotation, vector};
-use crate::{FbxError, Shares};
 
 /// Property of a channel that is its weight, percent.
 const WEIGHT: &str = "DeformPercent";

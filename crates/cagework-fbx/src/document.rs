@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
-use crate::FbxError;
+use crate::limits::FbxError;
 
 /// Targets of buffer views, as glTF numbers them.
 pub(crate) const VERTICES: u32 = 34962;

@@ -7,8 +7,8 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 use ufbx::{Material, MaterialMap, Mesh, Scene, Texture, WrapMode};
 
-use crate::FbxError;
 use crate::document::Document;
+use crate::limits::FbxError;
 
 /// Characters of a path that a URI keeps.
 const OF_PATHS: &AsciiSet = &NON_ALPHANUMERIC.remove(b'/').remove(b'.').remove(b'-').remove(b'_');

@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 use ufbx::{BlendChannel, BlendShape, Mesh, MeshPart, Node, Scene, VertexStream, VertexVec3};
 
 use crate::document::{Document, VERTICES};
+use crate::limits::{FbxError, Shares};
 use crate::node::{Nodes, vector};
 use crate::skin::{self, Skins};
-use crate::{FbxError, Shares};
 
 /// Attribute with the index of the control point of each vertex in its FBX mesh.
 pub(crate) const POINTS: &str = "_FBX_POINT";

@@ -5,8 +5,8 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use serde_json::{Map, Value, json};
 use ufbx::{Node, Scene, Transform};
 
-use crate::FbxError;
 use crate::document::Document;
+use crate::limits::FbxError;
 
 /// Nodes of the document, in the order of the FBX file without its root, followed by additional nodes.
 pub(crate) struct Nodes {

@@ -7,8 +7,8 @@ use glam::Mat4;
 use serde_json::json;
 use ufbx::{Mesh, Scene, SkinDeformer, SkinVertex, SkinWeight, SkinningMethod};
 
-use crate::FbxError;
 use crate::document::Document;
+use crate::limits::FbxError;
 use crate::node::Nodes;
 
 /// Influences per vertex that glTF stores in one pair of attributes.

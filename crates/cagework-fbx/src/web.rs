@@ -2,6 +2,8 @@
 
 use wasm_bindgen::prelude::*;
 
+use crate::convert::{Converted, convert};
+
 /// A converted file, for JavaScript.
 #[wasm_bindgen]
 #[derive(Debug)]
@@ -18,7 +20,7 @@ impl ConvertedFbx {
     /// The message says what is wrong in the file.
     #[wasm_bindgen(constructor)]
     pub fn new(fbx: &[u8], memory_limit: f64) -> Result<Self, JsError> {
-        let crate::Converted { glb, notices } = crate::convert(fbx, memory_limit as u64)?;
+        let Converted { glb, notices } = convert(fbx, memory_limit as u64)?;
         Ok(Self { glb, notices })
     }
 

@@ -66,6 +66,7 @@ const RULES: &[Rule] = &[
         may_use: &[
             "cagework-cage",
             "cagework-core",
+            "cagework-fbx",
             "cagework-files",
             "cagework-gpu",
             "cagework-io",
@@ -79,6 +80,7 @@ const RULES: &[Rule] = &[
         may_use: &[
             "cagework-cage",
             "cagework-core",
+            "cagework-fbx",
             "cagework-files",
             "cagework-io",
             "cagework-job",
