@@ -82,7 +82,7 @@ impl Document {
         let mut accessor =
             json!({ "bufferView": view, "componentType": F32, "count": values.len(), "type": kind });
         if bounds {
-            [accessor["min"], accessor["max"]] = bounds_of(values.iter());
+            [accessor["min"], accessor["max"]] = bounds_of(&values.iter());
         }
         self.push("accessors", accessor)
     }
@@ -95,7 +95,7 @@ impl Document {
         values: &[[f32; 3]],
     ) -> Result<usize, FbxError> {
         let is_zero_elsewhere = indices.len() < count;
-        let [least, most] = bounds_of(values.iter().chain(is_zero_elsewhere.then_some(&[0.0; 3])));
+        let [least, most] = bounds_of(&values.iter().chain(is_zero_elsewhere.then_some(&[0.0; 3])));
         let mut accessor =
             json!({ "componentType": F32, "count": count, "type": "VEC3", "min": least, "max": most });
         if !indices.is_empty() {
@@ -148,7 +148,7 @@ impl Document {
 }
 
 /// Minimum and maximum of each component.
-fn bounds_of<'a, const N: usize>(values: impl Iterator<Item = &'a [f32; N]> + Clone) -> [Value; 2] {
+fn bounds_of<'a, const N: usize>(values: &(impl Iterator<Item = &'a [f32; N]> + Clone)) -> [Value; 2] {
     let fold = |f: fn(f32, f32) -> f32, start: f32| {
         values.clone().fold([start; N], |all, value| std::array::from_fn(|k| f(all[k], value[k])))
     };

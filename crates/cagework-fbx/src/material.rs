@@ -47,7 +47,7 @@ pub(crate) fn write(
         n_sets.push(textures.n_sets);
         document.push("materials", written)?;
         let pbr = &material.pbr;
-        let kept = [&pbr.base_color, &pbr.emission_color, &pbr.normal_map].map(|map| id_of(map));
+        let kept = [&pbr.base_color, &pbr.emission_color, &pbr.normal_map].map(id_of);
         let others = material.textures.iter().map(|one| one.texture.element.typed_id);
         left_out.extend(others.filter(|id| !kept.contains(&Some(*id))));
     }

@@ -449,7 +449,7 @@ impl<'m> Job<'m> {
     /// targets are their differences from `by`, the displacements that the file contains.
     fn with_targets(
         &self,
-        bytes: Vec<u8>,
+        bytes: &[u8],
         by: &[DVec3],
         mut targets: Vec<(String, Vec<DVec3>)>,
         outside: &[u32],
@@ -458,7 +458,7 @@ impl<'m> Job<'m> {
         for (_, target) in &mut targets {
             target.iter_mut().zip(by).for_each(|(target, by)| *target -= *by);
         }
-        let mut moved = Model::read("moved.glb", &bytes, &mut |_| None)?;
+        let mut moved = Model::read("moved.glb", bytes, &mut |_| None)?;
         moved.set_up(self.model().up());
         moved.set_origin(self.model().origin());
         let ReshapeOptions { timeline, rigid, parts, expressions, .. } = options.clone();
@@ -484,7 +484,7 @@ impl<'m> Job<'m> {
                 let reshaped = model.write_reshaped(&by, &outside, first, &options);
                 let (bytes, report) = reshaped.map_err(|e| self.of_write(e))?;
                 written.bytes = if is_moved && !targets.is_empty() {
-                    self.with_targets(bytes, &by, targets, &outside, &options)?
+                    self.with_targets(&bytes, &by, targets, &outside, &options)?
                 } else {
                     bytes
                 };
