@@ -260,6 +260,14 @@ fn a_joint_of_another_bone_is_exchanged_with_it() {
     assert_eq!(["leftHand", "rightHand"].map(|bone| joint(&mut editor, bone)), [right, left]);
 }
 
+fn bound_document<'a>(
+    editor: &'a Editor,
+    bound: &'a Arc<BoundModels>,
+    ground: &'a KnownGround,
+) -> BoundDocument<'a> {
+    BoundDocument { editor, bound: Some(bound), parts: None, lattice: None, ground }
+}
+
 /// The document, bound on a coarse grid.
 fn bound(editor: &Editor) -> Arc<BoundModels> {
     let document = editor.document();
@@ -353,12 +361,11 @@ fn an_export_in_the_pose_plays_what_the_page_plays() {
     set(&mut editor, "arm", 1.4);
     editor.commit("Arms");
     let ground = KnownGround::default();
-    let all =
-        |editor| BoundDocument { editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
     let (id, options) = (editor.document().models.first().unwrap().id, RigOptions::default());
     let read = |bytes: Vec<u8>| Model::read("a.glb", &bytes, &mut |_| None).unwrap();
-    let posed = read(all(&editor).glb(id, &options, None).unwrap().bytes);
-    let animated = read(all(&editor).poses(id, &options, true, "Wave").unwrap().bytes);
+    let posed = read(bound_document(&editor, &bound, &ground).glb(id, &options, None).unwrap().bytes);
+    let animated =
+        read(bound_document(&editor, &bound, &ground).poses(id, &options, true, "Wave").unwrap().bytes);
     assert_eq!(animated.positions, posed.positions);
     let clip = animated.clips().iter().position(|clip| clip.name.as_deref() == Some("Wave")).unwrap();
     let player = animated.player().unwrap().unwrap();
@@ -367,7 +374,7 @@ fn an_export_in_the_pose_plays_what_the_page_plays() {
         editor.play_at(seconds);
         let RigPose { palette, targets, .. } = player.pose_at(Some(clip), seconds, &[]);
         let exported = skin_vertices(&player.skin, &palette, &targets);
-        let shown = all(&editor).deformed(&editor.document().pose).unwrap();
+        let shown = bound_document(&editor, &bound, &ground).deformed(&editor.document().pose).unwrap();
         let off = farthest(&exported, &shown);
         assert!(off < 10.0 * ROUNDING, "{off} at {seconds} s");
         let shares = editor.document().timeline().shares(seconds);

@@ -266,7 +266,7 @@ fn saved_and_opened(saved: &Editor) -> Document {
         poses: settings.poses(project.poses, cage.as_ref()),
         cage,
         shares: settings.shares(),
-        transition: settings.transition.unwrap_or_default(),
+        transition: settings.transition.clone().unwrap_or_default(),
         pins: settings.pins.clone(),
         bones: settings.given_bones(),
         sample: settings.sample.clone(),

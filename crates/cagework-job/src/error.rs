@@ -128,7 +128,7 @@ pub enum JobError {
     },
     /// A file with a moved rig, to which morph targets are added, cannot be read.
     #[error(transparent)]
-    Read(#[from] ReadError),
+    Read(Box<ReadError>),
     /// The rig cannot be read, or the file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -458,7 +458,8 @@ impl<'m> Job<'m> {
         for (_, target) in &mut targets {
             target.iter_mut().zip(by).for_each(|(target, by)| *target -= *by);
         }
-        let mut moved = Model::read("moved.glb", bytes, &mut |_| None)?;
+        let mut moved =
+            Model::read("moved.glb", bytes, &mut |_| None).map_err(|e| JobError::Read(Box::new(e)))?;
         moved.set_up(self.model().up());
         moved.set_origin(self.model().origin());
         let ReshapeOptions { timeline, rigid, parts, expressions, .. } = options.clone();

@@ -63,7 +63,7 @@ impl State {
     fn floor_height(&self) -> f32 {
         let is_bent = self.playing.as_ref().is_some_and(|playing| playing.field.is_some());
         let is_lifted = self.view.ground && !is_bent && !self.view.original && !self.editor.is_editing_rest();
-        if is_lifted { -self.lift.1 } else { 0.0 }
+        if is_lifted { -self.lift.height } else { 0.0 }
     }
 
     /// Whether the cage is drawn and can be moved: no clip is shown, the clip is paused, or the cage deforms the model

@@ -24,6 +24,15 @@ use crate::error::{Answer, ErrorName, Fault};
 use crate::options::JsSceneOptions;
 use crate::views::View;
 
+/// How far exports lift the models.
+#[derive(Debug, Default)]
+pub(crate) struct Lift {
+    /// Pose and models that the height was computed for.
+    of: Option<(Arc<[Vec3]>, u64)>,
+    /// Height, object units.
+    pub(crate) height: f32,
+}
+
 /// The editor's document, the camera, and derived data.
 #[derive(Default)]
 pub(crate) struct State {
@@ -51,8 +60,7 @@ pub(crate) struct State {
     /// Notices from the last export: changes of the rig, and data that the file format loses.
     pub(crate) rig_notices: Vec<String>,
     ground: KnownGround,
-    /// Height by which exports lift the models, object units, and the pose and models that it was computed for.
-    pub(crate) lift: (Option<(Arc<[Vec3]>, u64)>, f32),
+    pub(crate) lift: Lift,
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
     /// Weights on a lattice around the cage. They deform splats, and models that a clip moves.
@@ -447,17 +455,17 @@ impl State {
     /// Recomputes [`Self::lift`] when a pose becomes part of a history step. During a gesture the floor stays.
     fn update_lift(&mut self) {
         if self.bound.is_none() {
-            self.lift = (None, 0.0);
+            self.lift = Lift::default();
         }
         if !self.view.ground || self.bound.is_none() || !self.editor.is_pose_committed() {
             return;
         }
         let of = (Arc::clone(&self.editor.document().pose), self.editor.models_key());
-        if self.lift.0.as_ref().is_some_and(|(pose, models)| Arc::ptr_eq(pose, &of.0) && *models == of.1) {
+        if self.lift.of.as_ref().is_some_and(|(pose, models)| Arc::ptr_eq(pose, &of.0) && *models == of.1) {
             return;
         }
         // A rig that cannot be read cannot be exported either, and the export says why.
-        self.lift = (Some(of), self.bound_document().lift().unwrap_or_default());
+        self.lift = Lift { of: Some(of), height: self.bound_document().lift().unwrap_or_default() };
         self.is_changed = true;
     }
 
