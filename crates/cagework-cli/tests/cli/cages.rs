@@ -147,7 +147,7 @@ fn one_cage_encloses_models_and_folders_of_models() {
     sandbox
         .run("cage mesh.obj empty -o out.obj")
         .code(1)
-        .stderr(contains("empty: the folder has no models (.glb, .vrm, .gltf, .obj"));
+        .stderr(contains("empty: the folder has no models (.glb, .vrm, .gltf, .fbx, .obj"));
     sandbox
         .run("cage mesh.obj missing.obj -o out.obj")
         .code(1)
