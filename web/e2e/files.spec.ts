@@ -182,6 +182,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   await expect.poll(off).toBeLessThan(1e-5);
   await drop(page, [{ name: "tower.cagework.glb", bytes: Uint8Array.from(files.project) }]);
   await bound(page);
+  await unfold(page);
   await expect(choice.getByLabel("Z")).toBeChecked();
   const heights = (await cagePositions(page)).filter((_, k) => k % 3 === 1);
   expect(Math.max(...heights)).toBe(2);
