@@ -75,6 +75,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
 
   await test.step("changed settings of the cage apply when it is made", async () => {
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
+    await unfold(page);
     const gaps = page.getByLabel("Gaps left open");
     await expect(gaps).toHaveAttribute("aria-valuetext", "as small as the number of vertices allows");
     await gaps.fill("128");
