@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import type { Download, Page } from "@playwright/test";
 import { validationErrors } from "./models";
-import { bound, type DroppedFile, expect, largestMove, modelPositions, openWith } from "./support";
+import { bound, type DroppedFile, expect, largestMove, modelPositions, openWith, unfold } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
 /** Tolerance for distances between vertices of a rigid model, relative to the model's size. */
@@ -53,6 +53,7 @@ export function apart(all: readonly number[]) {
 /** Clicks the export button of the given kind; returns the `n` files that it downloads. */
 export async function downloads(page: Page, kind: string, n: number): Promise<DroppedFile[]> {
   await step(page, "Export");
+  await unfold(page);
   const heard: Download[] = [];
   const hear = (file: Download) => heard.push(file);
   page.on("download", hear);

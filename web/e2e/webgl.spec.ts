@@ -51,6 +51,7 @@ test("without WebGPU the page opens, poses and draws", async ({ page }) => {
     await page.keyboard.press("Escape");
 
     await page.getByRole("button", { name: "Bind", exact: false }).first().click();
+    await unfold(page);
     await expect(page.getByRole("radio", { name: "Graphics card" })).toBeDisabled();
     await expect(page.getByRole("radio", { name: "Processor" })).toBeChecked();
     await expect(page.getByText(/graphics card needs WebGPU/)).toBeVisible();
