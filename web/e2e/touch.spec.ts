@@ -117,12 +117,12 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
 
   await test.step("spreading fingers zooms in, pinching zooms out", async () => {
     const together = [
-      [170, 220],
-      [250, 220],
+      [170, 150],
+      [250, 150],
     ] as const;
     const spread = [
-      [150, 220],
-      [270, 220],
+      [150, 150],
+      [270, 150],
     ] as const;
     const before = await seen();
     await fingers(cdp, together, spread);
