@@ -119,8 +119,8 @@ pub(super) struct NarrowGaps {
 }
 
 /// Finds the gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a lattice
-/// that leaves open those for which a cage of `target` vertices has enough of them: the small ones too, only the large ones, or
-/// none, with a lattice of `base` cubic voxels. Gaps narrower than twice the `clearance` of
+/// that leaves open as many of them as `target` vertices suffice for: all but the smallest, only the large ones, or none.
+/// In the last case, the lattice has `base` cubic voxels. Gaps narrower than twice the `clearance` of
 /// the cage from the model (object units) are left out, because they close on any lattice.
 ///
 /// # Errors
@@ -254,8 +254,8 @@ impl ModelGap {
         inside as f64 / self.points.len() as f64
     }
 
-    /// Returns a sentence about the gap, of which the cage closes the `share`, with its position. `[first, voxels]`: voxels along the longest side of the first lattice, and of the lattice on which the cage was
-    /// made.
+    /// Returns a sentence about a gap that a cage closes, with its position. `share`: share of the gap that is closed.
+    /// `[first, voxels]`: voxels along the longest side of the first lattice, and of the lattice of the cage.
     pub(super) fn notice(&self, share: f64, [first, voxels]: [usize; 2], options: &CageOptions) -> String {
         let wanted = self.voxels_of(DVec3::ONE);
         let least = self.least_target;
