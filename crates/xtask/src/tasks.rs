@@ -172,14 +172,10 @@ fn check_files() -> Result<(), String> {
     arrows::check()?;
     deny::check()?;
     one_version()?;
-    // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a
-    // release.
-    let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
-    for name in
-        ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-job", "cagework-gpu"]
-    {
-        package.extend(["-p", name]);
-    }
+    // Packs every crate that does not say `publish = false`. Fails if one lacks metadata or files, or depends on a
+    // crate that is not published. Building the packages is left to the same command before a release.
+    let package =
+        ["publish", "--workspace", "--dry-run", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
     run("cargo", &package, &[])
 }
 
