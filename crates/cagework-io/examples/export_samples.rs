@@ -61,7 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ),
     ];
     for (name, bytes) in inputs {
-        let model = Model::read(name, &bytes, &mut |uri| (uri == "red dot.png").then(|| Ok(PNG.to_vec())))?;
+        let texture = |uri: &str| matches!(uri, "red dot.png" | "wood grain.png").then(|| Ok(PNG.to_vec()));
+        let model = Model::read(name, &bytes, &mut |uri| texture(uri))?;
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
         let raised: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::Z).collect();
         let poses = [("twisted".to_owned(), moved.clone()), ("raised".to_owned(), raised)];
