@@ -48,25 +48,34 @@ for (const name of names) {
   const frames = JSON.parse(readFileSync(join(directory, name), "utf8"));
   const { clips } = frames[0];
   const { animations } = clips === undefined ? gltf : await load(clips);
-  let mesh;
+  // One per primitive. A model's vertices are those of all primitives, in their order.
+  const meshes = [];
   gltf.scene.traverse((object) => {
-    if (object.isMesh) mesh = object;
+    if (object.isMesh) meshes.push(object);
   });
+  const vertices = meshes.flatMap((mesh) =>
+    Array.from({ length: mesh.geometry.attributes.position.count }, (_, k) => ({ mesh, k })),
+  );
   const mixer = new AnimationMixer(gltf.scene);
   mixer.clipAction(animations[0]).play();
   for (const { seconds, weights, expression, positions, origin } of frames) {
-    if (weights !== undefined) mesh.morphTargetInfluences = weights;
+    if (weights !== undefined) {
+      for (const mesh of meshes) mesh.morphTargetInfluences = weights;
+    }
     if (expression !== undefined) {
       for (const [target, weight] of bindsOf(gltf.parser.json.extensions, expression)) {
-        mesh.morphTargetInfluences[target] = weight;
+        for (const mesh of meshes) mesh.morphTargetInfluences[target] = weight;
       }
     } else {
       mixer.setTime(seconds);
     }
     gltf.scene.updateMatrixWorld(true);
     const size = Math.max(...positions) - Math.min(...positions);
-    for (let v = 0; v < positions.length / 3; v += 1) {
-      const at = mesh.getVertexPosition(v, new Vector3()).applyMatrix4(mesh.matrixWorld);
+    if (vertices.length !== positions.length / 3) {
+      throw new Error(`${name} has ${positions.length / 3} vertices, three.js reads ${vertices.length}`);
+    }
+    for (const [v, { mesh, k }] of vertices.entries()) {
+      const at = mesh.getVertexPosition(k, new Vector3()).applyMatrix4(mesh.matrixWorld);
       at.sub(new Vector3().fromArray(origin));
       const expected = new Vector3().fromArray(positions, 3 * v);
       worst = Math.max(worst, at.distanceTo(expected) / size);
