@@ -23,7 +23,7 @@ use crate::common::{
 };
 
 /// A SOG of 240 splats with spherical harmonics of degree 1.
-const SOG: &[u8] = include_bytes!("../splats/helix.sog");
+const SOG: &[u8] = include_bytes!("../../crates/cagework-io/tests/splats/helix.sog");
 
 /// Number of GLB samples, which precede all other samples.
 const N_GLB: usize = 7;
@@ -108,9 +108,9 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         samples.push(capture.write(format, &capture.positions).expect("the capture is valid"));
     }
     // SPZ 4 with compressed blocks, and with uncompressed blocks, in which damaged bytes change the decoded values.
-    samples.push(include_bytes!("../splats/helix-4.spz").to_vec());
-    samples.push(include_bytes!("../splats/six-4.spz").to_vec());
-    samples.push(include_bytes!("../splats/helix.compressed.ply").to_vec());
+    samples.push(include_bytes!("../../crates/cagework-io/tests/splats/helix-4.spz").to_vec());
+    samples.push(include_bytes!("../../crates/cagework-io/tests/splats/six-4.spz").to_vec());
+    samples.push(include_bytes!("../../crates/cagework-io/tests/splats/helix.compressed.ply").to_vec());
     samples.push(SOG.to_vec());
     samples
         .extend([fbx::placed(), fbx::rigged()].iter().flat_map(|file| [fbx::text(file), fbx::binary(file)]));

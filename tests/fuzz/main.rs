@@ -8,7 +8,7 @@
 //! A child process runs the inputs, since stack overflow and memory exhaustion end the process. It prints the
 //! number of each input before running it, so the parent knows which input failed.
 
-#[path = "../common/mod.rs"]
+#[path = "../../crates/cagework-io/tests/common/mod.rs"]
 mod common;
 mod inputs;
 mod survive;
@@ -68,7 +68,7 @@ fn main() -> ExitCode {
 
 /// Damaged files that failed in the past.
 fn found() -> Vec<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/found");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/found");
     let entries = std::fs::read_dir(folder).expect("the folder exists");
     entries.map(|entry| entry.expect("the entry is readable").path().display().to_string()).collect()
 }
@@ -251,5 +251,5 @@ fn keep(seed: u64, number: u64) -> std::io::Result<PathBuf> {
 
 /// Root of the repository. Tests run in the directory of their crate.
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the crate is in crates/").to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate is in the root").to_path_buf()
 }

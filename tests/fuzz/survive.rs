@@ -1,6 +1,6 @@
 //! Runs the operations of the command line and of the web page on each input.
 
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use cagework_cage::check::{Repair, check, repair};
 use cagework_cage::generate::{CageKind, CageOptions, Symmetry};
@@ -12,11 +12,14 @@ use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::NoProgress;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
+use cagework_gpu::render::{DrawModel, check_layers};
+use cagework_gpu::{ContextOptions, GpuContext, Session};
 use cagework_io::{
     Joints, Model, ModelFormat, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
     read_weights_npz, write_inner_controls, write_weights_npz,
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use pollster::block_on;
 
 use crate::common::{CUBE_OBJ, cube, read, twist};
 use crate::inputs;
@@ -47,6 +50,11 @@ static REST: LazyLock<Rest> = LazyLock::new(|| {
     let weights = FieldWeights::bind(&closed, GRID, &options, &NoProgress).expect("the cage is closed");
     let field = weights.pose(closed.positions(), &posed);
     Rest { samples: inputs::samples(), cage, closed, points, binding, field }
+});
+
+/// Session on a GPU, which the pictures of all inputs share.
+static SESSION: LazyLock<Mutex<Session>> = LazyLock::new(|| {
+    Mutex::new(Session::new(block_on(GpuContext::new(&ContextOptions::default())).expect("there is a GPU")))
 });
 
 /// Memory limit of each reader, bytes.
@@ -92,6 +100,7 @@ pub(crate) fn survive(bytes: &[u8]) {
         as_rig(&model, choice);
         as_pose(&model);
         as_model(&model, choice);
+        as_picture(&model);
         as_cage(&model.cage_mesh(), choice);
     }
 }
@@ -214,6 +223,22 @@ fn as_model(model: &Model, choice: u32) {
             // The cage encloses the model, but with the classic method, a thin cage may have no interior cells.
             Err(error) => assert_eq!(options.method, Method::Classic, "{error}"),
         }
+    }
+}
+
+/// Draws the model as `cagework render` does, without its textures.
+fn as_picture(model: &Model) {
+    const SIZE: [u32; 2] = [64; 2];
+    let mut session = SESSION.lock().unwrap_or_else(PoisonError::into_inner);
+    let drawn = DrawModel::plain(model.positions.clone(), model.triangles.clone());
+    if block_on(session.set_model(drawn)).is_err() {
+        return;
+    }
+    session.camera_mut().set_viewport(Vec2::splat(SIZE[0] as f32));
+    session.frame_all();
+    session.camera_mut().fit(&model.positions);
+    if check_layers(session.context(), session.camera(), &model.positions, &model.triangles, SIZE).is_ok() {
+        let _ = block_on(session.picture(SIZE, 1.0));
     }
 }
 
