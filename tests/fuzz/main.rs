@@ -41,6 +41,13 @@ fn main() -> ExitCode {
         ["--try", seed, first] => {
             if let (Ok(seed), Ok(first)) = (seed.parse(), first.parse()) {
                 try_from(seed, first);
+                return ExitCode::SUCCESS;
+            }
+            ExitCode::FAILURE
+        }
+        ["--write", seed] => {
+            if let Ok(seed) = seed.parse() {
+                write_all(seed);
             }
             ExitCode::FAILURE
         }
@@ -78,16 +85,32 @@ fn usage() -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Runs inputs until the process is killed.
+/// Number of inputs that a child process runs. Software adapters keep about 1 MB per picture until the process ends.
+const N_PER_PROCESS: u64 = 1000;
+
+/// Runs inputs until the process is killed, at most [`N_PER_PROCESS`].
 fn try_from(seed: u64, first: u64) {
     let mut inputs = inputs::Inputs::new(seed);
     let mut out = std::io::stdout().lock();
-    for number in first.. {
+    for number in first..first + N_PER_PROCESS {
         let written = writeln!(out, "{number}").and_then(|()| out.flush());
         if written.is_err() {
             return;
         }
         survive::survive(&inputs.get(number));
+    }
+}
+
+/// Writes inputs to stdout until it is closed, each with its length before it. Read by `page.mjs`.
+fn write_all(seed: u64) {
+    let mut inputs = inputs::Inputs::new(seed);
+    let mut out = std::io::stdout().lock();
+    for number in 0.. {
+        let input = inputs.get(number);
+        let length = (input.len() as u32).to_le_bytes();
+        if out.write_all(&length).and_then(|()| out.write_all(&input)).is_err() {
+            return;
+        }
     }
 }
 
@@ -219,9 +242,8 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
         let how = trial.end(ended != Some(RecvTimeoutError::Disconnected));
         // An input interrupted at the end of the time is not counted.
         next = current + u64::from(ended.is_some());
-        if ended.is_some() {
+        if let Some(how) = how.filter(|_| ended.is_some()) {
             failures += 1;
-            let how = how.unwrap_or_else(|| "ended".to_owned());
             match keep(seed, current) {
                 Ok(path) => println!(
                     "fuzz: input {current} of seed {seed} {how}; again: cargo xtask fuzz {}",

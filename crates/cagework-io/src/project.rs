@@ -207,10 +207,11 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     let mut models = vec![model];
     for part in project["more"].as_array().into_iter().flatten() {
         let bytes = view(part).ok_or(damaged("one of its models is cut off"))?;
+        left = left.checked_sub(bytes.len()).ok_or(damaged("its models share their bytes"))?;
         let taken: u64 = models.iter().map(Model::bytes).sum();
-        let left = memory_limit.saturating_sub(taken);
+        let free = memory_limit.saturating_sub(taken);
         let name = part["name"].as_str().unwrap_or("model");
-        let mut model = Model::read_within(name, bytes, &mut |_| None, left)?;
+        let mut model = Model::read_within(name, bytes, &mut |_| None, free)?;
         model.require_faces()?;
         place(&mut model)?;
         models.push(model);

@@ -64,7 +64,7 @@ const FIRST_REMEDY: usize = 4;
 const MAX_ATTEMPTS: usize = 11;
 
 /// Number of pairs of quads that meet after the fit of rings, above which the fit of vertices is left out: it does not
-/// separate them. The first attempts have it in any case.
+/// separate them. The first attempts for a rig have it in any case.
 const MAX_CROSSINGS: usize = 6;
 
 /// Share of the work of an attempt that is the fit of rings; the rest is that of vertices.
@@ -319,7 +319,8 @@ pub fn generate(
         let thin = thinned(&plan.samples);
         let mut fit = Fit::new(&plan, base, &thin);
         fit.fit_rings(&|done| go_on(RING_SHARE * done))?;
-        if attempt < FIRST_REMEDY || fit.n_crossings() <= MAX_CROSSINGS {
+        let is_tangled = fit.n_crossings() > MAX_CROSSINGS;
+        if !is_tangled || (skeleton.is_rigged && attempt < FIRST_REMEDY) {
             fit.fit_vertices(&plan.samples, &|done| go_on(RING_SHARE + (1.0 - RING_SHARE) * done))?;
         }
         let (fault, why) = match finish(&fit, &units, skeleton, &fine) {
@@ -338,7 +339,10 @@ pub fn generate(
         let mut learnt = remedies.clone();
         learnt.learn(&fit, &fault);
         next += 1;
-        // Models without a rig may be soups of many points, for which each attempt takes seconds.
+        // Models without a rig may be soups, for which each attempt takes seconds.
+        if !skeleton.is_rigged && is_tangled && attempt > 0 {
+            return Err(why.into());
+        }
         if skeleton.is_rigged && next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
             // The rings to avoid were those of other limbs.
             learnt.avoided.clear();

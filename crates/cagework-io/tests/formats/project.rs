@@ -194,16 +194,22 @@ fn damaged_projects_and_those_of_other_versions_are_errors() {
     assert!(read_project("x.glb", &bytes[..bytes.len() - 9], u64::MAX).is_err());
 }
 
-/// A small file could otherwise hold any number of poses of a large cage.
+/// A small file could otherwise hold any number of poses of a large cage, or of models.
 #[test]
-fn poses_that_share_their_positions_are_an_error() {
+fn parts_that_share_their_bytes_are_an_error() {
     let bytes = written(&models()[1]);
-    let mut json = json_of(&bytes);
+    let json = json_of(&bytes);
     let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];
-    let poses = &mut json["extensions"]["CAGEWORK_project"]["poses"];
-    *poses = vec![poses[0].clone(); 10_000].into();
-    let shared = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX).unwrap_err();
-    assert_eq!(shared.to_string(), "x.glb is a damaged project: its poses share their positions");
+    let project = json["extensions"]["CAGEWORK_project"].clone();
+    for (list, part, problem) in [
+        ("poses", &project["poses"][0], "poses share their positions"),
+        ("more", &project["cage"]["positions"], "models share their bytes"),
+    ] {
+        let mut json = json.clone();
+        json["extensions"]["CAGEWORK_project"][list] = vec![part.clone(); 10_000].into();
+        let shared = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX).unwrap_err();
+        assert_eq!(shared.to_string(), format!("x.glb is a damaged project: its {problem}"));
+    }
 }
 
 /// A point cloud in a project is stored as its file.
