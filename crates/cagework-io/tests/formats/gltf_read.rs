@@ -337,7 +337,9 @@ fn trailing_bytes_and_missing_bin_padding_are_tolerated() {
     json["meshes"] = json!([]);
     json["nodes"] = json!([]);
     json["scenes"] = json!([{}]);
-    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("it has no triangles or points"));
+    assert!(
+        read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("it has no triangles or points")
+    );
     json["animations"] = json!([{ "channels": [], "samplers": [] }]);
     assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("refit --skeleton"));
 }
