@@ -175,6 +175,7 @@ pub(crate) enum LatticeFormat {
     cagework deform person.ply --cage cage.obj --rig humanoid.glb --clip Walk --split -o walk.ply\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb\n  \
+    cagework deform avatar.fbx --cage cage.obj --weights avatar.npz --pose wide.obj --displacements wide.json\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj --times 0.4,1.2 \
     --interpolation cubic -o poses.glb\n  \
     cagework deform face.vrm --cage cage.obj --weights face.npz --pose a.obj --pose b.obj --name happy --name smirk \
@@ -215,8 +216,12 @@ pub(crate) struct DeformArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) pose_controls: Vec<PathBuf>,
     /// File to write; the extension selects the format.
-    #[arg(short, long, value_name = "FILE", required_unless_present = "lattice")]
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["lattice", "displacements"])]
     pub(crate) output: Option<ModelOutput>,
+    /// For an FBX: write how the poses move its control points (.npz, .json), in the units and axes of the file, for a blend
+    /// shape of the original file.
+    #[arg(long, value_name = "FILE", value_parser = displacements_output, conflicts_with_all = ["clip", "dynamic", "split", "expression", "shape_only", "ground", "feet"])]
+    pub(crate) displacements: Option<PathBuf>,
     /// Times of the poses in the animation, in seconds, ascending: one per pose, separated by commas. The animation starts
     /// at 0 with the shape at rest, or with the first pose if its time is 0, and ends with the last pose. To return to
     /// rest, give the cage as the last pose.
@@ -356,6 +361,10 @@ fn npz_output(text: &str) -> Result<PathBuf, String> {
 
 fn lattice_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["npz", "py"])
+}
+
+fn displacements_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["npz", "json"])
 }
 
 fn glb_output(text: &str) -> Result<PathBuf, String> {

@@ -70,6 +70,11 @@ pub(crate) fn write(
         }
         let Some(Some(written)) = meshes.get(&key) else { continue };
         nodes.set(number, "mesh", written.number.into());
+        // With both, displacements can go back to the control points of the file.
+        let shown = node.parent.as_ref().filter(|_| node.is_geometry_transform_helper);
+        let name = shown.map_or(&node.element.name, |parent| &parent.element.name);
+        let origin = json!({ "node": &**name, "scale": scene.metadata.geometry_scale });
+        nodes.set(number, "extras", json!({ "fbx": origin }));
         if let Some(deformer) = skin::of(mesh) {
             let skin = skins.write(deformer, written.has_own_joint.then_some(number), nodes, document)?;
             nodes.set(number, "skin", skin.into());

@@ -1,8 +1,12 @@
 //! FBX files, which `cagework_fbx` converts to GLB before they are read.
 
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
 use thiserror::Error;
 
-use crate::gltf;
+use crate::gltf::{self, GltfError};
 use crate::memory::MemoryError;
 
 /// Error of reading an FBX file.
@@ -43,4 +47,83 @@ pub(crate) fn convert(_: &[u8], _: u64) -> Result<Converted, FbxError> {
 /// Names of external images; empty if the file cannot be converted.
 pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     convert(bytes, memory_limit).map_or(Vec::new(), |fbx| gltf::named_files(&fbx.glb, memory_limit))
+}
+
+/// Displacements of the control points of a mesh, in the units and axes of the mesh in the FBX file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FbxDisplacements {
+    /// Name of the node that shows the mesh.
+    pub node: String,
+    /// Name of the mesh.
+    pub mesh: String,
+    /// Indices of the control points of faces, ascending. `[n_points]`
+    pub indices: Vec<u32>,
+    /// Positions at rest, without blend shapes. `[n_points, 3]`
+    pub positions: Vec<[f32; 3]>,
+    /// `[n_poses][n_points, 3]`
+    pub displacements: Vec<Vec<[f32; 3]>>,
+}
+
+/// Reads the last `n_poses` morph targets of a GLB that was written from an FBX file. Nodes that show the same mesh of the
+/// file have one item each. Empty if the GLB has no meshes of an FBX file.
+///
+/// # Errors
+/// If the GLB cannot be read.
+pub fn fbx_displacements(glb: &[u8], n_poses: usize) -> Result<Vec<FbxDisplacements>, GltfError> {
+    let document = gltf::document_written("displacements.glb", glb)?;
+    let vectors = |accessor: &Value, scale: f64| -> Result<Vec<[f32; 3]>, GltfError> {
+        let Some(accessor) = accessor.as_u64() else { return Ok(Vec::new()) };
+        let values = document.source().floats::<3>(accessor as u32, "a position")?;
+        Ok(values.into_iter().map(|p| p.map(|x| (f64::from(x) / scale) as f32)).collect())
+    };
+    let mut all = Vec::new();
+    for node in document.json["nodes"].as_array().into_iter().flatten() {
+        let origin = &node["extras"]["fbx"];
+        let (Some(name), Some(scale), Some(mesh)) =
+            (origin["node"].as_str(), origin["scale"].as_f64(), node["mesh"].as_u64())
+        else {
+            continue;
+        };
+        let mesh = &document.json["meshes"][mesh as usize];
+        // Position and displacements of each control point, from its first vertex.
+        let mut points: BTreeMap<u32, Vec<[f32; 3]>> = BTreeMap::new();
+        for primitive in mesh["primitives"].as_array().into_iter().flatten() {
+            let attributes = &primitive["attributes"];
+            let Some(indices) = attributes["_FBX_POINT"].as_u64() else { continue };
+            let indices = document.source().floats::<1>(indices as u32, "_FBX_POINT")?;
+            let targets = primitive["targets"].as_array().map_or(&[][..], Vec::as_slice);
+            let targets = &targets[targets.len().saturating_sub(n_poses)..];
+            let mut columns = vec![vectors(&attributes["POSITION"], scale)?];
+            for target in targets {
+                columns.push(vectors(&target["POSITION"], scale)?);
+            }
+            let of = |v: usize| columns.iter().map(move |column| column.get(v).copied().unwrap_or_default());
+            for (v, [index]) in indices.into_iter().enumerate() {
+                points.entry(index as u32).or_insert_with(|| of(v).collect());
+            }
+        }
+        let column = |k: usize| points.values().map(|of| of.get(k).copied().unwrap_or_default()).collect();
+        all.push(FbxDisplacements {
+            node: name.to_owned(),
+            mesh: mesh["name"].as_str().unwrap_or_default().to_owned(),
+            indices: points.keys().copied().collect(),
+            positions: column(0),
+            displacements: (1..=n_poses).map(column).collect(),
+        });
+    }
+    Ok(all)
+}
+
+/// Writes displacements as JSON: `poses`, the names of the poses, and `meshes`, a list of [`FbxDisplacements`].
+///
+/// # Panics
+/// Never: the struct has no keys that JSON cannot represent.
+#[must_use]
+pub fn write_displacements_json(poses: &[String], meshes: &[FbxDisplacements]) -> Vec<u8> {
+    #[derive(Serialize)]
+    struct File<'a> {
+        poses: &'a [String],
+        meshes: &'a [FbxDisplacements],
+    }
+    serde_json::to_vec(&File { poses, meshes }).expect("the struct has text keys only")
 }

@@ -46,7 +46,7 @@ mod up;
 pub use blender::write_field_blender;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
-pub use fbx::FbxError;
+pub use fbx::{FbxDisplacements, FbxError, fbx_displacements, write_displacements_json};
 pub use gltf::{
     Clip, Feet, GltfError, Ground, JointPlayer, JointPoint, Joints, PROJECT_EXTENSION, Player,
     ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,
@@ -56,7 +56,10 @@ pub use memory::MemoryError;
 pub use model::{
     FormatError, FormatFacts, Model, ModelFormat, PoseState, ReadError, RestoreError, Store, StoredArrays,
 };
-pub use npz::{NpzError, SavedWeights, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
+pub use npz::{
+    NpzError, SavedWeights, read_weights_npz, write_displacements_npz, write_field_npz, write_weights_npz,
+    write_zip,
+};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use origin::origin_near;
 pub use part_kind::PartKind;

@@ -13,6 +13,7 @@ pub use stored::{RestoreError, Store, StoredArrays};
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use cagework_core::color::srgb_from_linear;
 use cagework_core::splats::Splats;
 use cagework_core::{Bounds, PolygonMesh, TriMesh};
 use glam::{DVec3, Quat, Vec3};
@@ -296,9 +297,17 @@ impl Model {
     fn point_colors(&self) -> Vec<Vec3> {
         let bounds = Bounds::around(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
         let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
-        let color = |(k, &p): (u32, &Vec3)| match &self.document {
-            Document::Polygons(document) if document.colors.contains_key(&k) => {
+        let look = match &self.document {
+            Document::Gltf(document) if document.has_colors() => Some(self.look()),
+            _ => None,
+        };
+        let color = |(k, &p): (u32, &Vec3)| match (&self.document, &look) {
+            (Document::Polygons(document), _) if document.colors.contains_key(&k) => {
                 Vec3::from(document.colors[&k])
+            }
+            (_, Some(look)) => {
+                let [r, g, b, _] = look.vertices[k as usize].color;
+                Vec3::new(r, g, b).map(srgb_from_linear)
             }
             _ => 0.3 + 0.6 * (p - bounds.min) / size,
         };

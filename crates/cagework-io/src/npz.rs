@@ -25,6 +25,7 @@ use glam::{DVec3, Mat3, UVec3, Vec3};
 use thiserror::Error;
 use zip::result::ZipError;
 
+use crate::fbx::FbxDisplacements;
 use crate::memory::MemoryError;
 use crate::order::{Budget, Expansion};
 use crate::shown::shown;
@@ -191,6 +192,29 @@ pub fn write_field_npz(field: &Field, origin: DVec3, up: UpAxis) -> Vec<u8> {
     let of_node = |k: usize| (turn.transpose() * field.node_gradient(k).transpose() * turn).to_cols_array();
     zip.put("F", "<f4", &[nx, ny, nz, 3, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
     zip.put("bound", "|b1", &[nx, ny, nz], nodes().map(|k| [u8::from(field.values[k].w > 0.0)]));
+    zip.finish()
+}
+
+/// Writes displacements of control points as an `.npz` file. Arrays:
+///
+/// - `poses`, `nodes`, `meshes`: names of the poses, and for each mesh of its node and of itself;
+/// - for mesh k from 0: `indices_k` (int32, `[n]`), `positions_k` (float32, `[n, 3]`) and `displacements_k` (float32,
+///   `[n_poses, n, 3]`), as in [`FbxDisplacements`].
+#[must_use]
+pub fn write_displacements_npz(poses: &[String], meshes: &[FbxDisplacements]) -> Vec<u8> {
+    let longest = meshes.iter().map(|mesh| mesh.indices.len()).max().unwrap_or(0);
+    let mut zip = NpzWriter::new(0, 12 * poses.len().max(1) * longest);
+    zip.put_names("poses", poses.iter().map(String::as_str));
+    zip.put_names("nodes", meshes.iter().map(|mesh| mesh.node.as_str()));
+    zip.put_names("meshes", meshes.iter().map(|mesh| mesh.mesh.as_str()));
+    for (k, FbxDisplacements { indices, positions, displacements, .. }) in meshes.iter().enumerate() {
+        let (n, bytes) = (indices.len(), |x: &f32| x.to_le_bytes());
+        zip.put(&format!("indices_{k}"), "<i4", &[n], indices.iter().map(|i| i.to_le_bytes()));
+        let values = positions.as_flattened().iter().map(bytes);
+        zip.put(&format!("positions_{k}"), "<f4", &[n, 3], values);
+        let values = displacements.iter().flat_map(|pose| pose.as_flattened()).map(bytes);
+        zip.put(&format!("displacements_{k}"), "<f4", &[displacements.len(), n, 3], values);
+    }
     zip.finish()
 }
 

@@ -10,6 +10,7 @@ pub(crate) mod spz;
 use cagework_core::splats::Splats;
 use cagework_core::words::counted;
 use glam::{DVec3, Quat, Vec3};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
@@ -92,7 +93,7 @@ pub(crate) struct Capture {
 }
 
 /// Parts of the capture's file that an export in the same format reuses.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) enum Records {
     /// A 3DGS PLY.
     Ply,
@@ -102,6 +103,20 @@ pub(crate) enum Records {
     Gltf(String),
     /// Exports are new files.
     New,
+}
+
+impl Records {
+    /// Takes out the decompressed content of an SPZ, which JSON would enlarge; empty for other formats.
+    pub(crate) fn take_body(&mut self) -> Vec<u8> {
+        if let Self::Spz(body) = self { std::mem::take(&mut body.bytes) } else { Vec::new() }
+    }
+
+    /// Puts back the result of [`Self::take_body`].
+    pub(crate) fn put_body(&mut self, bytes: Vec<u8>) {
+        if let Self::Spz(body) = self {
+            body.bytes = bytes;
+        }
+    }
 }
 
 /// Splats as a reader returns them, in the axes of the file.

@@ -7,8 +7,8 @@ use cagework_core::{PolygonMesh, TriMesh};
 use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{
-    Look, LookAlpha, LookWrap, Model, RestoreError, Store, StoredArrays, TexturePlan, UpAxis, read_project,
-    transfer_report,
+    Look, LookAlpha, LookWrap, Model, ModelFormat, RestoreError, Store, StoredArrays, TexturePlan, UpAxis,
+    read_project, transfer_report,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
@@ -67,6 +67,12 @@ impl LoadedModel {
     /// If the file cannot be read.
     pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Answer<LoadedModel> {
         Self::from_bytes(name, bytes.0, sibling)
+    }
+
+    /// Whether a file that begins with `start` is an FBX, which is converted to a GLB before it is read.
+    #[wasm_bindgen(js_name = isFbx)]
+    pub fn is_fbx(name: &str, start: &[u8]) -> bool {
+        ModelFormat::of_file(name, start) == Ok(ModelFormat::Fbx)
     }
 
     /// Reads materials and textures of all models of the file; call it before [`Self::take_next`]. It is separate from

@@ -10,14 +10,17 @@ use cagework_core::deform::{deform_bound, outside_in_words};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::words::counted;
 use cagework_core::{BindOptions, Cage};
-use cagework_io::{Clip, Model, SavedWeights, Timeline, shown};
-use cagework_job::{BoundPoints, Job, JobError, JobOptions, NamedPose, PoseTimes, Poses};
+use cagework_io::{
+    Clip, Model, ModelFormat, SavedWeights, Timeline, fbx_displacements, shown, write_displacements_json,
+    write_displacements_npz,
+};
+use cagework_job::{BoundPoints, Job, JobError, JobOptions, NamedPose, PoseTimes, Poses, Written};
 use glam::Vec3;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, ModelOutput, SmoothArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, SmoothArgs};
 use crate::bind::bind_job;
 use crate::controls::{rest_of, with_inner};
-use crate::error::CliError;
+use crate::error::{CliError, shown_path};
 use crate::field::{LatticeSummary, write_lattice};
 use crate::files::{check_outputs, json, print, write};
 use crate::load::{LoadedCage, load_any, load_cage, load_weights};
@@ -41,13 +44,14 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
-    let outputs = args.output.iter().map(|output| output.path.as_path()).chain(args.lattice.as_deref());
+    let models = args.output.iter().map(|output| output.path.as_path());
+    let outputs = models.chain(args.lattice.as_deref()).chain(args.displacements.as_deref());
     check_outputs(&outputs.collect::<Vec<_>>(), &inputs)?;
     check_names(args)?;
     let model = load_any(&args.mesh, args.read.axis(), args.read.memory)?;
     let lattice = args.lattice.as_deref().map(|path| lattice(args, path, &model)).transpose()?;
-    if let Some(output) = &args.output {
-        let summary = deform(args, &model, output, lattice)?;
+    if args.output.is_some() || args.displacements.is_some() {
+        let summary = deform(args, &model, lattice)?;
         return print(&if as_json { json(&summary) } else { text(&summary) });
     }
     lattice.map_or(Ok(()), |lattice| print(&if as_json { json(&lattice) } else { lattice.text() }))
@@ -57,7 +61,8 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 fn lattice(args: &DeformArgs, path: &Path, model: &Model) -> Result<LatticeSummary, CliError> {
     let options = args.rig.job_options(false);
     // Options of rigs apply to the model that is written beside the lattice.
-    let of_rig = options.first_for_rigs().filter(|_| args.output.is_none());
+    let is_alone = args.output.is_none() && args.displacements.is_none();
+    let of_rig = options.first_for_rigs().filter(|_| is_alone);
     match options.first_for_parts().or(of_rig) {
         Some(option) => Err(CliError::Mismatch {
             message: format!(
@@ -73,12 +78,15 @@ fn lattice(args: &DeformArgs, path: &Path, model: &Model) -> Result<LatticeSumma
 fn deform(
     args: &DeformArgs,
     model: &Model,
-    output: &ModelOutput,
     lattice: Option<LatticeSummary>,
 ) -> Result<DeformSummary, CliError> {
-    let (memory, of_output) = (args.read.memory, |e| CliError::job(&output.path, e));
-    let job = Job::new(model, output.format, &job_options(args, model)?);
-    let job = job.map_err(|e| CliError::job(&args.mesh, e))?;
+    let path = args.output.as_ref().map(|output| &output.path).or(args.displacements.as_ref());
+    let (memory, path) = (args.read.memory, path.unwrap_or(&args.mesh));
+    let of_output = |e| CliError::job(path, e);
+    let format = args.output.as_ref().map_or(ModelFormat::Gltf, |output| output.format);
+    let options = job_options(args, model)?;
+    let of_mesh = |e| CliError::job(&args.mesh, e);
+    let job = Job::new(model, format, &options).map_err(of_mesh)?;
     check_inputs(args, job.uses_field())?;
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, model, memory, &controls)?;
@@ -111,10 +119,22 @@ fn deform(
         split = job.split(&bound, pose).map_err(of_output)?;
     }
     let job = split.as_ref().map_or(&job, |(job, _)| job);
-    let deformed = job.deform(&bound, &poses).map_err(of_output)?;
-    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let mut written = job.write(deformed).map_err(of_output)?;
-    write(&output.path, &written.bytes)?;
+    let mut displaced = None;
+    if let Some(path) = &args.displacements {
+        let job = Job::new(model, ModelFormat::Gltf, &options).map_err(of_mesh)?;
+        displaced = Some((path, displacements(args, path, &job, &bound, (&names, &poses))?));
+    }
+    let (mut written, mut deform_ms) = (Written::default(), started.elapsed().as_secs_f64() * 1e3);
+    if let Some(output) = &args.output {
+        let started = Instant::now();
+        let deformed = job.deform(&bound, &poses).map_err(of_output)?;
+        deform_ms = started.elapsed().as_secs_f64() * 1e3;
+        written = job.write(deformed).map_err(of_output)?;
+        write(&output.path, &written.bytes)?;
+    }
+    if let Some((path, bytes)) = &displaced {
+        write(path, bytes)?;
+    }
     if let Some((_, [n_bent, n_split])) = split {
         written.set_split(n_bent, n_split);
     }
@@ -122,8 +142,41 @@ fn deform(
     subject.count(&written);
     notices.extend(subject.outside_in_words());
     notices.extend(written.notices);
-    let output = output.path.display().to_string();
-    Ok(DeformSummary { output, subject, rig: written.rig, deform_ms, lattice, notices })
+    let output = args.output.as_ref().map(|output| output.path.display().to_string());
+    let displacements = args.displacements.as_ref().map(|path| path.display().to_string());
+    Ok(DeformSummary { output, displacements, subject, rig: written.rig, deform_ms, lattice, notices })
+}
+
+/// Computes the file of `--displacements`: each pose as a morph target of the model at rest, by control points.
+fn displacements(
+    args: &DeformArgs,
+    path: &Path,
+    job: &Job<'_>,
+    bound: &BoundPoints,
+    (names, poses): (&[String], &Poses),
+) -> Result<Vec<u8>, CliError> {
+    let of_output = |e| CliError::job(path, e);
+    let all = match poses {
+        Poses::Shape(positions) => {
+            vec![NamedPose { name: names[0].clone(), positions: positions.clone() }]
+        }
+        Poses::Targets { all, .. } => all.clone(),
+    };
+    let targets = Poses::Targets { base: None, all, timeline: None };
+    job.check_memory_to_write(&targets, 0, args.read.memory.bytes()).map_err(of_output)?;
+    let written = job.deform(bound, &targets).and_then(|deformed| job.write(deformed)).map_err(of_output)?;
+    let meshes = fbx_displacements(&written.bytes, names.len()).map_err(|e| CliError::file(&args.mesh, e))?;
+    if meshes.is_empty() {
+        return Err(CliError::Mismatch {
+            message: format!("{}: --displacements needs a model from an FBX file", shown_path(&args.mesh)),
+            hint: "give the FBX file, or leave out --displacements",
+        });
+    }
+    Ok(if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
+        write_displacements_json(names, &meshes)
+    } else {
+        write_displacements_npz(names, &meshes)
+    })
 }
 
 /// Options of the job that the arguments describe.

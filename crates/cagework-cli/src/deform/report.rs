@@ -11,7 +11,10 @@ use crate::field::LatticeSummary;
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
 pub(super) struct DeformSummary {
-    pub(super) output: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) output: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) displacements: Option<String>,
     #[serde(flatten)]
     pub(super) subject: Subject,
     /// Changes to skeleton, morph targets and clips; `None` if the file keeps none.
@@ -93,7 +96,9 @@ fn splats_or_points(is_splats: bool, n: usize) -> String {
 
 /// Formats the summary as text.
 pub(super) fn text(summary: &DeformSummary) -> String {
-    let (ms, output) = (summary.deform_ms, shown(&summary.output));
+    let ms = summary.deform_ms;
+    let output = summary.output.as_ref().or(summary.displacements.as_ref());
+    let output = output.map_or_else(String::new, |output| shown(output));
     let mut out = match &summary.subject {
         Subject::Mesh {
             vertices,
@@ -119,6 +124,9 @@ pub(super) fn text(summary: &DeformSummary) -> String {
             decimals(*seconds, 2),
         ),
     };
+    if let (Some(_), Some(displacements)) = (&summary.output, &summary.displacements) {
+        out += &format!("wrote {}\n", shown(displacements));
+    }
     out += &summary.lattice.as_ref().map_or_else(String::new, LatticeSummary::text);
     for notice in &summary.notices {
         out += &format!("note: {notice}\n");

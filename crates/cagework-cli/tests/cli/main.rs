@@ -12,6 +12,7 @@ mod deform;
 mod demo;
 mod documents;
 mod doors;
+mod fbx;
 mod field;
 mod fit;
 #[cfg(unix)]

@@ -8,6 +8,7 @@ use ::gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use cagework_core::words::counted;
 use glam::{DMat3, DMat4, DVec3, Vec3};
+use serde_json::Value;
 
 use super::accessor::Source;
 use super::scene::Instance;
@@ -44,20 +45,21 @@ pub(crate) fn read(
     notices: &mut Vec<String>,
 ) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
-    let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
+    let (mut skipped, mut morphed, mut ragged, mut n_clouds) = (0, 0, 0, 0);
     let mut n_splats = 0_u64;
     let (mut is_rigged, mut repeated) = (false, Vec::new());
     let mut unweighted: BTreeMap<u32, usize> = BTreeMap::new();
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
-            let Some((position, mode)) = surface(primitive) else {
+            let Some((position, mode)) = vertices(&document.json, instance.mesh, p, primitive) else {
                 match splats_of(document, instance.mesh, p) {
                     Some(n) => n_splats = n_splats.saturating_add(n),
                     None => skipped += 1,
                 }
                 continue;
             };
+            n_clouds += usize::from(mode == Mode::Points);
             let start = geometry.positions.len();
             let (local, n_morphed) = positions(document, instance, primitive, position)?;
             morphed += n_morphed;
@@ -122,8 +124,11 @@ pub(crate) fn read(
         ));
     }
     if skipped > 0 {
-        notices
-            .push(format!("{} of points or lines: not shown", counted(skipped, "primitive", "primitives")));
+        notices.push(format!("{} of lines: not shown", counted(skipped, "primitive", "primitives")));
+    }
+    if n_clouds > 0 && !geometry.triangles.is_empty() {
+        let primitives = counted(n_clouds, "primitive", "primitives");
+        notices.push(format!("{primitives} of points: moved with the triangles, but not shown"));
     }
     if morphed > 0 {
         notices
@@ -156,9 +161,26 @@ fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<()
 
 /// Number of splats of a primitive, which may declare any number; `None` if the primitive is not one of splats.
 fn splats_of(document: &GltfDocument, mesh: u32, p: usize) -> Option<u64> {
-    document.json["meshes"][mesh as usize]["primitives"][p]["extensions"].get(SPLATS_EXTENSION)?;
+    if !is_splats(&document.json, mesh, p) {
+        return None;
+    }
     let position = attribute(&document.root.meshes[mesh as usize].primitives[p], Semantic::Positions);
     Some(position.and_then(|of| document.source().count(of).ok()).unwrap_or(0))
+}
+
+fn is_splats(json: &Value, mesh: u32, p: usize) -> bool {
+    json["meshes"][mesh as usize]["primitives"][p]["extensions"].get(SPLATS_EXTENSION).is_some()
+}
+
+/// Position accessor and mode of a primitive whose vertices the model has: triangles and points; `None` for lines and
+/// splats. `primitive`: primitive `p` of a mesh of the document.
+pub(super) fn vertices(json: &Value, mesh: u32, p: usize, primitive: &Primitive) -> Option<(u32, Mode)> {
+    match primitive.mode {
+        Checked::Valid(Mode::Points) if !is_splats(json, mesh, p) => {
+            Some((attribute(primitive, Semantic::Positions)?, Mode::Points))
+        }
+        _ => surface(primitive),
+    }
 }
 
 /// Position accessor and mode of a triangle primitive; `None` for points and lines.
@@ -247,12 +269,6 @@ fn add_morphs(
     Ok(())
 }
 
-/// Whether the default scene shows points.
-pub(super) fn has_points(document: &GltfDocument) -> bool {
-    let meshes = document.instances.iter().map(|instance| &document.root.meshes[instance.mesh as usize]);
-    meshes.flat_map(|mesh| &mesh.primitives).any(|p| matches!(p.mode, Checked::Valid(Mode::Points)))
-}
-
 /// Triangles of a primitive, with indices of the primitive's own vertices; empty for points and lines.
 pub(super) fn triangles_of(
     document: &GltfDocument,
@@ -276,6 +292,9 @@ fn triangles(
     flip: bool,
     all: &mut Vec<[u32; 3]>,
 ) -> Result<usize, GltfError> {
+    if mode == Mode::Points {
+        return Ok(0);
+    }
     let indices: Vec<u32> = match primitive.indices {
         None => (0..count).collect(),
         Some(accessor) => {

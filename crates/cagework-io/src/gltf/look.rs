@@ -27,6 +27,13 @@ struct Images<'a> {
     left: usize,
 }
 
+impl GltfDocument {
+    /// Whether vertices of the model have colours.
+    pub(crate) fn has_colors(&self) -> bool {
+        self.slots.iter().any(|slot| attribute(self.primitive(slot).1, Semantic::Colors(0)).is_some())
+    }
+}
+
 /// Appearance of a document. `positions` and `triangles` are those of the model.
 pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
     let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();

@@ -188,12 +188,9 @@ pub enum GltfError {
     /// The splats cannot be read.
     #[error(transparent)]
     Splats(#[from] SplatError),
-    /// The default scene shows no triangles.
-    #[error("it has no triangles (points and lines are not surfaces)")]
+    /// The default scene shows neither triangles nor points.
+    #[error("it has no triangles or points (lines are not surfaces)")]
     NoTriangles,
-    /// The default scene shows points, but no triangles.
-    #[error("it has points, but no triangles: a PLY of the same points works")]
-    OnlyPoints,
     /// The default scene shows no triangles, but the file contains clips.
     #[error(
         "it has clips, but no triangles: open the model that they move, then fit them to its skeleton (command: \
@@ -260,7 +257,7 @@ pub(crate) struct GltfDocument {
     joints: Vec<Vec<DMat4>>,
     /// Approximate memory of the document and its geometry, bytes.
     pub(crate) bytes: u64,
-    /// The triangle primitives of `instances`, with their ranges of vertices and triangles.
+    /// The primitives of triangles and points of `instances`, with their ranges of vertices and triangles.
     slots: Vec<Slot>,
     /// Permit to read the accessors.
     permit: Permit<DocumentSize>,
@@ -425,7 +422,6 @@ pub(crate) fn read(
         match (has_clips, clips_alone) {
             (true, true) => {}
             (true, false) => return Err(GltfError::OnlyClips),
-            (false, _) if geometry::has_points(&document) => return Err(GltfError::OnlyPoints),
             (false, _) => return Err(GltfError::NoTriangles),
         }
     }

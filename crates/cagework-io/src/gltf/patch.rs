@@ -16,7 +16,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::animate::{self, MeshPlacement, Pose, PoseClip};
-use super::geometry::{Frame, attribute, positions, surface, world_normals, world_tangents};
+use super::geometry::{Frame, attribute, positions, vertices, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Rig, Slot};
@@ -69,7 +69,7 @@ pub(crate) fn patch(
         let place = &places[slot.instance as usize];
         let shape = Shape::new(slot, place, normals.as_deref(), base, &of_base);
         let tangents = if normals.is_some() { tangents(document, slot, place, &of_base)? } else { None };
-        let flip = place.detached && is_mirrored(document, slot)?;
+        let flip = place.detached && !slot.triangles.is_empty() && is_mirrored(document, slot)?;
         let indices = flip.then(|| {
             let corners = rest.triangles[slot.triangles.clone()].iter().flatten().map(|&v| v - slot.start);
             pack.push_indices(&mut json, corners)
@@ -98,15 +98,7 @@ pub(crate) fn patch(
         }
     }
     for (number, place) in places.iter().enumerate() {
-        patch_points_and_lines(
-            document,
-            number as u32,
-            place,
-            rest.origin,
-            poses.len(),
-            &mut json,
-            &mut pack,
-        )?;
+        patch_others(document, number as u32, place, rest.origin, poses.len(), &mut json, &mut pack)?;
     }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
@@ -115,9 +107,9 @@ pub(crate) fn patch(
     pack.finish(json)
 }
 
-/// Patches the points and lines of an instance, which are not deformed. They lose their skin and morph targets, stay in
+/// Patches the lines and splats of an instance, which are not deformed. They lose their skin and morph targets, stay in
 /// their rest pose, and get one empty target per pose, because all primitives of a mesh have equally many targets.
-fn patch_points_and_lines(
+fn patch_others(
     document: &GltfDocument,
     instance: u32,
     place: &MeshPlacement,
@@ -126,9 +118,10 @@ fn patch_points_and_lines(
     json: &mut Value,
     pack: &mut Pack<'_>,
 ) -> Result<(), WriteError> {
-    let mesh = document.instances[instance as usize].mesh as usize;
-    for (number, primitive) in document.root.meshes[mesh].primitives.iter().enumerate() {
-        let position = attribute(primitive, Semantic::Positions).filter(|_| surface(primitive).is_none());
+    let mesh = document.instances[instance as usize].mesh;
+    for (number, primitive) in document.root.meshes[mesh as usize].primitives.iter().enumerate() {
+        let is_moved = vertices(&document.json, mesh, number, primitive).is_some();
+        let position = attribute(primitive, Semantic::Positions).filter(|_| !is_moved);
         let Some(position) = position else { continue };
         let count = document.source().count(position)? as usize;
         if place.detached || primitive.targets.is_some() {

@@ -11,8 +11,8 @@ use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
 
 use super::accessor::{MAX_DECODED_VALUES, MAX_ELEMENTS, Source, count, count_absent};
-use super::container::bytes_of_json;
-use super::geometry::surface;
+use super::container::{GltfContents, bytes_of_json};
+use super::geometry::vertices;
 use super::scene::Instance;
 use super::{GltfError, Headers};
 use crate::order::{Budget, Expansion, Order, Permit, Price};
@@ -135,12 +135,11 @@ impl DocumentSize {
     fn of(headers: &Headers) -> Result<Self, GltfError> {
         let (mut model, mut unseen) = (Size::default(), Size::default());
         for shown in by_mesh(&headers.instances) {
-            model.add(shown.len() as u64, of_mesh(&headers.loaded.root, shown[0].mesh)?);
+            model.add(shown.len() as u64, of_mesh(&headers.loaded, shown[0].mesh)?);
         }
         for hidden in by_mesh(&headers.elsewhere) {
             // Meshes outside the scene that cannot be read have size zero.
-            unseen
-                .add(hidden.len() as u64, of_mesh(&headers.loaded.root, hidden[0].mesh).unwrap_or_default());
+            unseen.add(hidden.len() as u64, of_mesh(&headers.loaded, hidden[0].mesh).unwrap_or_default());
         }
         let clips = headers.loaded.json["animations"].as_array().map_or(&[][..], Vec::as_slice);
         let channels: usize = clips.iter().map(|clip| clip["channels"].as_array().map_or(0, Vec::len)).sum();
@@ -293,13 +292,13 @@ fn numbers_in(document: &Headers, accessor: u64) -> Option<u64> {
     Some(count(&document.loaded.root, accessor as u32).ok()?.saturating_mul(width))
 }
 
-fn of_mesh(root: &Root, mesh: u32) -> Result<Size, GltfError> {
+fn of_mesh(GltfContents { root, json, .. }: &GltfContents, mesh: u32) -> Result<Size, GltfError> {
     let mut size = Size::default();
-    for primitive in &root.meshes[mesh as usize].primitives {
+    for (p, primitive) in root.meshes[mesh as usize].primitives.iter().enumerate() {
         size.primitives += 1;
         let n_targets = primitive.targets.as_ref().map_or(0, Vec::len) as u64;
         size.targets = size.targets.max(n_targets);
-        let Some((position, mode)) = surface(primitive) else { continue };
+        let Some((position, mode)) = vertices(json, mesh, p, primitive) else { continue };
         let vertices = count(root, position)?;
         let (attributes, mut zeros) = check_counts(root, primitive, vertices)?;
         let corners = match primitive.indices {
@@ -311,7 +310,11 @@ fn of_mesh(root: &Root, mesh: u32) -> Result<Size, GltfError> {
             }
         };
         size.zeros = size.zeros.saturating_add(zeros);
-        let triangles = if mode == Mode::Triangles { corners / 3 } else { corners };
+        let triangles = match mode {
+            Mode::Triangles => corners / 3,
+            Mode::Points => 0,
+            _ => corners,
+        };
         size.vertices = size.vertices.saturating_add(vertices);
         size.triangles = size.triangles.saturating_add(triangles);
         let decoded = (attributes + n_targets).saturating_mul(vertices).saturating_add(corners);

@@ -1,5 +1,5 @@
 //! A model as arrays of bytes. A web worker reads a file and stores the model; the page restores the model without
-//! parsing the file again, except for a capture.
+//! parsing the file again.
 //!
 //! The first array is JSON with the small values. The other arrays are in the order in which [`Model::store`] and
 //! [`Look::store`] append them. Worker and page belong to one build, so the format has no version.
@@ -8,18 +8,20 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::Pod;
+use cagework_core::splats::Splats;
 use glam::{DVec3, Vec3};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Document, Model, ModelFormat, ReadError};
+use super::{Document, Model, ModelFormat};
 use crate::counts::Counts;
 use crate::gltf::{GltfDocument, GltfParts};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, sniff_image};
 use crate::obj::{Group, Material, PolygonDocument};
 use crate::polygons::Encoding;
 use crate::siblings::Image;
+use crate::splats::{Capture, Records};
 use crate::up::UpAxis;
 
 /// Why a stored model cannot be restored.
@@ -28,9 +30,6 @@ pub enum RestoreError {
     /// An array is missing, or was not written by [`Model::store`].
     #[error("the model that was read is damaged: open the file again")]
     Damaged,
-    /// The file of a capture, which is read again, has an error.
-    #[error(transparent)]
-    Read(#[from] ReadError),
 }
 
 /// Arrays of bytes of a stored model.
@@ -62,8 +61,13 @@ struct Head {
 
 #[derive(Serialize, Deserialize)]
 enum HeadDocument {
-    Capture,
-    Obj { materials: Vec<String>, groups: Vec<Group>, looks: Vec<(String, Option<StoredImage>)> },
+    /// Degree of the spherical harmonics, and the records without the body of an SPZ.
+    Capture(u8, Records),
+    Obj {
+        materials: Vec<String>,
+        groups: Vec<Group>,
+        looks: Vec<(String, Option<StoredImage>)>,
+    },
     Gltf(GltfHead),
 }
 
@@ -150,7 +154,7 @@ impl StoredArrays<'_> {
 }
 
 impl Model {
-    /// Appends the model to `store`. The file of a capture is stored unchanged.
+    /// Appends the model to `store`.
     pub fn store(self, store: &mut Store) {
         let Self { name, positions, triangles, counts, notices, up, origin, bytes, format, .. } = self;
         let Self { encoding, has_normals, document, capture, .. } = self;
@@ -169,12 +173,20 @@ impl Model {
         let first = store.arrays.len();
         store.arrays.push(Vec::new());
         store.push(&origin.to_array());
+        store.push(&positions);
         if let Some(capture) = capture {
-            store.arrays[first] = serde_json::to_vec(&head(HeadDocument::Capture, 0)).unwrap_or_default();
-            store.arrays.push(Arc::unwrap_or_clone(capture).file);
+            let Capture { splats, file, mut records } = Arc::unwrap_or_clone(capture);
+            store.arrays.push(file);
+            store.arrays.push(records.take_body());
+            store.push(&splats.scales);
+            store.push(&splats.rotations);
+            store.push(&splats.opacities);
+            store.push(&splats.colors);
+            store.push(&splats.harmonics);
+            let document = HeadDocument::Capture(splats.degree, records);
+            store.arrays[first] = serde_json::to_vec(&head(document, 0)).unwrap_or_default();
             return;
         }
-        store.push(&positions);
         store.push(&triangles);
         drop((positions, triangles));
         let document = match document {
@@ -194,17 +206,27 @@ impl Model {
         let head: Head = from.json()?;
         let origin: [f64; 3] = from.numbers::<f64>()?.try_into().map_err(|_| RestoreError::Damaged)?;
         let origin = DVec3::from_array(origin);
-        if matches!(head.document, HeadDocument::Capture) {
-            let file = from.bytes()?;
-            let mut model = Self::read(&head.name, &file, &mut |_| None)?;
-            model.set_origin(origin);
-            model.set_up(head.up);
-            model.notices = head.notices;
-            return Ok(model);
+        let positions: Vec<Vec3> = from.numbers()?;
+        let (mut triangles, mut capture) = (Vec::new(), None);
+        if !matches!(head.document, HeadDocument::Capture(..)) {
+            triangles = from.numbers()?;
         }
-        let (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>) = (from.numbers()?, from.numbers()?);
         let document = match head.document {
-            HeadDocument::Capture => return Err(RestoreError::Damaged),
+            HeadDocument::Capture(degree, mut records) => {
+                let file = from.bytes()?;
+                records.put_body(from.bytes()?);
+                let splats = Splats {
+                    positions: positions.clone(),
+                    scales: from.numbers()?,
+                    rotations: from.numbers()?,
+                    opacities: from.numbers()?,
+                    colors: from.numbers()?,
+                    degree,
+                    harmonics: from.numbers()?,
+                };
+                capture = Some(Arc::new(Capture { splats, file, records }));
+                Document::Polygons(Box::default())
+            }
             HeadDocument::Obj { materials, groups, looks } => {
                 let mut document = restore_obj(from)?;
                 (document.materials, document.groups) = (materials, groups);
@@ -234,7 +256,7 @@ impl Model {
             encoding,
             has_normals,
             document,
-            capture: None,
+            capture,
         })
     }
 }

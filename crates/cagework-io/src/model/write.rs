@@ -323,9 +323,6 @@ impl Model {
     ) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
         poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
-        if self.triangles.is_empty() {
-            return Err(WriteError::NoFaces { format: "GLB" });
-        }
         let at_rest = self.positions_in_file();
         let base = self.up.turned_back(base);
         let turned: Vec<_> = poses.iter().map(|(_, positions)| self.up.turned_back(positions)).collect();
@@ -333,6 +330,9 @@ impl Model {
             Document::Gltf(document) => {
                 let rest = Rest { positions: &at_rest, origin: self.origin, triangles: &self.triangles };
                 return gltf::patch(document, rest, &base, &named(poses, &turned), clip);
+            }
+            Document::Polygons(_) if self.triangles.is_empty() => {
+                return Err(WriteError::NoFaces { format: "GLB" });
             }
             Document::Polygons(document) => document,
         };

@@ -58,6 +58,15 @@ impl NpzWriter {
         self.put(name, "<f4", &[points.len(), 3], values);
     }
 
+    /// Adds names as a Unicode array `[n]`, padded with zeros.
+    pub(super) fn put_names<'a>(&mut self, name: &str, names: impl Iterator<Item = &'a str>) {
+        let names: Vec<Vec<u32>> = names.map(|name| name.chars().map(u32::from).collect()).collect();
+        let width = names.iter().map(Vec::len).max().unwrap_or(0).max(1);
+        let padded = |name: &Vec<u32>| [name.as_slice(), &vec![0; width - name.len()]].concat();
+        let values = names.iter().flat_map(padded).map(u32::to_le_bytes);
+        self.put(name, &format!("<U{width}"), &[names.len()], values);
+    }
+
     /// Adds an array. Values are converted in blocks, which avoids a second copy of the array.
     pub(super) fn put<const N: usize>(
         &mut self,

@@ -9,6 +9,7 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use glam::{DVec3, Quat, Vec3};
 use ruzstd::decoding::FrameDecoder;
+use serde::{Deserialize, Serialize};
 
 use super::{
     RawSplats, ReadSplats, Records, SplatError, SplatOrder, SplatsToWrite, band_0, color_of, log_scale,
@@ -47,14 +48,15 @@ const MAX_FIXED_POINT: f64 = 8_388_607.0;
 const ROTATION_STEPS: f32 = 511.0;
 
 /// Decompressed content of a file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Body {
-    bytes: Vec<u8>,
+    #[serde(skip)]
+    pub(super) bytes: Vec<u8>,
     layout: Layout,
 }
 
 /// Numbers of the header that determine the sizes of the arrays.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Layout {
     version: u32,
     count: usize,

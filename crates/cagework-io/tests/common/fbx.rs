@@ -191,15 +191,20 @@ pub(crate) fn geometry(id: i64) -> Item {
     object("Geometry", id, "box", "Mesh", Vec::new(), children)
 }
 
+/// A texture whose image is a file.
+pub(crate) fn texture(id: i64, name: &str, path: &str, properties: Vec<Item>) -> Item {
+    let path = || Text(path.into());
+    let files = vec![leaf("FileName", path()), leaf("RelativeFilename", path())];
+    object("Texture", id, name, "", properties, files)
+}
+
 fn materials() -> Vec<Item> {
     let one = |id, name, color: &[f64]| {
         let properties = vec![property("DiffuseColor", "Color", color)];
         object("Material", id, name, "", properties, vec![leaf("ShadingModel", Text("lambert".into()))])
     };
-    let path = || Text(r"C:\work\maps\wood grain.png".into());
-    let files = vec![leaf("FileName", path()), leaf("RelativeFilename", path())];
-    let texture = object("Texture", 22, "wood", "", Vec::new(), files);
-    vec![one(20, "red", &[1.0, 0.0, 0.0]), one(21, "wooden", &[0.5, 0.5, 0.5]), texture]
+    let wood = texture(22, "wood", r"C:\work\maps\wood grain.png", Vec::new());
+    vec![one(20, "red", &[1.0, 0.0, 0.0]), one(21, "wooden", &[0.5, 0.5, 0.5]), wood]
 }
 
 /// A box at a node with a pre-rotation of 90 degrees about z, a translation and a geometric translation.

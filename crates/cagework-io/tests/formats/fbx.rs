@@ -1,9 +1,12 @@
 //! FBX files, whose expected positions follow from the file by formula.
 
 use cagework_io::{Model, ModelFormat};
-use glam::{Mat3, Vec3};
+use glam::{DVec2, Mat3, Vec3};
+use serde_json::{Value, json};
 
-use crate::common::fbx::{BOX, Item, binary, corners, placed, rigged, text};
+use crate::common::fbx::{
+    self, BOX, Item, binary, connect, corners, geometry, object, placed, property, rigged, text, texture,
+};
 use crate::common::{PNG, json_of, read, volume};
 
 /// A point of an FBX file, centimetres with z up, in metres with y up.
@@ -57,6 +60,84 @@ fn textures_are_looked_for_beside_the_file() {
     let json = json_of(&model.write_glb(&model.positions).unwrap());
     assert_eq!(json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"]["index"], 0);
     assert_eq!(json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][0], 1.0);
+}
+
+/// A box with a physical material of 3ds Max. The base colour's image has its opacity, too.
+fn painted(metalness: f64, scaling: &[f64], degrees: f64) -> Model {
+    let main = |name: &str| format!("3dsMax|main|{name}");
+    let properties = vec![
+        property("3dsMax|ClassIDa", "int", &[-804_315_648.0]),
+        property("3dsMax|ClassIDb", "int", &[-1_099_438_848.0]),
+        property(&main("metalness"), "Float", &[metalness]),
+    ];
+    let moved = vec![
+        property("Translation", "Vector", &[0.25, 0.0, 0.0]),
+        property("Rotation", "Vector", &[0.0, 0.0, degrees]),
+        property("Scaling", "Vector", scaling),
+    ];
+    let mut objects = vec![
+        geometry(1),
+        object("Model", 2, "crate", "Mesh", Vec::new(), Vec::new()),
+        object("Material", 20, "wood", "", properties, Vec::new()),
+        texture(22, "base", "base.png", moved),
+    ];
+    let mut connections = vec![connect(2, 0, ""), connect(1, 2, ""), connect(20, 2, "")];
+    connections.extend(["base_color_map", "opacity_map"].map(|map| connect(22, 20, &main(map))));
+    for (id, map) in (23..).zip(["Roughness_Map", "ao_map", "displacement_map"]) {
+        objects.push(texture(id, map, &format!("{map}.png"), Vec::new()));
+        connections.push(connect(id, 20, &main(map)));
+    }
+    file(&fbx::file(objects, connections))
+}
+
+#[test]
+fn textures_are_kept_where_gltf_reads_the_same_channels() {
+    let model = painted(0.0, &[0.5, 0.5, 1.0], 90.0);
+    let lost = "1 texture of roughness, opacity or other properties: not converted from FBX";
+    assert!(model.notices.iter().any(|found| found == lost), "{:?}", model.notices);
+    let json = json_of(&model.write_glb(&model.positions).unwrap());
+    let (material, images) = (&json["materials"][0], &json["images"]);
+    let image = |info: &Value| {
+        let texture = &json["textures"][info["index"].as_u64().unwrap() as usize];
+        images[texture["source"].as_u64().unwrap() as usize]["uri"].as_str().unwrap().to_owned()
+    };
+    let surface = &material["pbrMetallicRoughness"];
+    assert_eq!(image(&surface["metallicRoughnessTexture"]), "Roughness_Map.png");
+    assert_eq!((&surface["metallicFactor"], &surface["roughnessFactor"]), (&0.0.into(), &1.0.into()));
+    assert_eq!(image(&material["occlusionTexture"]), "ao_map.png");
+    assert_eq!((&material["alphaMode"], &surface["baseColorFactor"][3]), (&"BLEND".into(), &1.0.into()));
+
+    // In FBX, v points upwards, and the image is scaled by 1/2, turned by 90 degrees and moved by (1/4, 0).
+    assert_eq!(json["extensionsUsed"], json!(["KHR_texture_transform"]));
+    let transform = &surface["baseColorTexture"]["extensions"]["KHR_texture_transform"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let pair = |key: &str| DVec2::new(number(&transform[key][0]), number(&transform[key][1]));
+    let (sin, cos) = number(&transform["rotation"]).sin_cos();
+    for uv in [DVec2::new(0.0, 0.0), DVec2::new(1.0, 0.25), DVec2::new(-0.5, 2.0)] {
+        let back = uv - DVec2::new(0.25, 0.0);
+        let expected = DVec2::new(back.y, -back.x) / 0.5;
+        let scaled = pair("scale") * DVec2::new(uv.x, 1.0 - uv.y);
+        let turned = DVec2::new(cos * scaled.x + sin * scaled.y, cos * scaled.y - sin * scaled.x);
+        let found = turned + pair("offset");
+        assert!(DVec2::new(found.x, 1.0 - found.y).distance(expected) < 1e-6, "{uv}: {found}");
+    }
+}
+
+#[test]
+fn textures_that_gltf_cannot_express_are_named() {
+    // A grey image of roughness would also be read as metalness. An image that is stretched, then turned, is sheared.
+    let model = painted(0.5, &[0.5, 1.0, 1.0], 45.0);
+    let json = json_of(&model.write_glb(&model.positions).unwrap());
+    let surface = &json["materials"][0]["pbrMetallicRoughness"];
+    assert_eq!((surface.get("metallicRoughnessTexture"), &surface["metallicFactor"]), (None, &0.5.into()));
+    assert!(surface["baseColorTexture"].get("extensions").is_none());
+    let notices = [
+        "2 textures of roughness, opacity or other properties: not converted from FBX",
+        "the transform of texture 'base' in the FBX file is left out: glTF scales an image before it turns it",
+    ];
+    for notice in notices {
+        assert!(model.notices.iter().any(|found| found == notice), "{:?}", model.notices);
+    }
 }
 
 /// The clip turns the upper corners about x by 90 degrees per second, and moves corner 0 by 8 cm in a second.

@@ -1,12 +1,12 @@
 //! glTF reader: all ways to store a mesh.
 
-use cagework_io::{Model, ModelFormat};
-use glam::Vec3;
+use cagework_io::{Model, ModelFormat, ReshapeOptions};
+use glam::{DVec3, Vec3};
 use serde_json::json;
 
 use crate::common::{
-    self, Builder, CUBE, CUBE_TRIANGLES, I16, U8, U32, cube, floats, glb, instanced, plain_cube, quantized,
-    read, relative_error, skinned, volume,
+    self, Builder, CUBE, CUBE_TRIANGLES, F32, I16, U8, U32, cube, floats, glb, instanced, json_of,
+    plain_cube, quantized, read, relative_error, skinned, twist, volume,
 };
 
 /// Tolerance for coordinates near 1 that are rounded to f32 once or twice.
@@ -229,7 +229,7 @@ fn skinned_mesh_is_read_in_its_rest_pose() {
 fn inverse_bind_matrices_undo_the_joints() {
     let mut b = skinned();
     let bind = |z: f32| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., -z, 1.];
-    let matrices = b.accessor(&floats(&[bind(0.0), bind(2.0)].concat()), common::F32, 2, "MAT4");
+    let matrices = b.accessor(&floats(&[bind(0.0), bind(2.0)].concat()), F32, 2, "MAT4");
     b.json["skins"][0]["inverseBindMatrices"] = matrices.into();
     assert_cube(&read_glb(&b), &cube());
 }
@@ -255,7 +255,55 @@ fn unknown_required_material_extensions_are_accepted() {
 }
 
 #[test]
-fn points_and_lines_are_skipped() {
+fn points_open_as_points_and_move_in_their_file() {
+    let mut b = plain_cube();
+    let red = b.accessor(&floats(&[[1.0, 0.0, 0.0]; 8].concat()), F32, 8, "VEC3");
+    b.primitive(0)["mode"] = 0.into();
+    b.primitive(0)["attributes"]["COLOR_0"] = red.into();
+    b.json["nodes"][0]["scale"] = json!([2.0, 2.0, 2.0]);
+    let model = read_glb(&b);
+    let doubled: Vec<Vec3> = cube().iter().map(|p| 2.0 * *p).collect();
+    assert_eq!((&model.positions, model.n_faces()), (&doubled, 0));
+    let drawn = model.drawn_splats().unwrap();
+    assert!(drawn.len() == 8 && drawn.colors[7].distance(Vec3::X) < 1e-6, "{}", drawn.colors[7]);
+    assert!(model.write_glb(&model.positions).unwrap() == b.glb(), "an unmoved model is its file");
+
+    let bent: Vec<Vec3> = doubled.iter().map(|&p| twist(p)).collect();
+    let written = model.write(ModelFormat::Gltf, &bent).unwrap();
+    let again = read("again.glb", &written).unwrap();
+    let off = again.positions.iter().zip(&bent).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!(off < 1e-6, "{off}");
+    let json = json_of(&written);
+    let primitive = &json["meshes"][0]["primitives"][0];
+    assert!(primitive["mode"] == 0 && primitive["attributes"]["COLOR_0"].is_u64(), "{primitive}");
+    let ply = read("points.ply", &model.write(ModelFormat::Ply, &bent).unwrap()).unwrap();
+    assert_eq!((&ply.positions, ply.n_faces()), (&bent, 0));
+}
+
+#[test]
+fn points_beside_triangles_move_with_them() {
+    let mut b = plain_cube();
+    let points = b.cube_mesh("points");
+    b.primitive(points)["mode"] = 0.into();
+    b.push("nodes", json!({ "mesh": points }));
+    b.json["scenes"][0]["nodes"] = json!([0, 1]);
+    let model = read_glb(&b);
+    assert_eq!((model.positions.len(), model.triangles.len()), (16, 12));
+    let notice = "1 primitive of points: moved with the triangles, but not shown";
+    assert!(model.notices.iter().any(|found| found == notice), "{:?}", model.notices);
+    let shifted: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::Y).collect();
+    let by = vec![DVec3::Y; 16 + model.extra_points().unwrap().len()];
+    for written in [
+        model.write_glb(&shifted).unwrap(),
+        model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap().0,
+    ] {
+        let again = read("again.glb", &written).unwrap().positions;
+        assert!(again.iter().zip(&shifted).all(|(a, b)| a.distance(*b) < 1e-6), "{again:?}");
+    }
+}
+
+#[test]
+fn lines_are_skipped() {
     let mut b = instanced();
     let lines = b.cube_mesh("lines");
     b.primitive(lines)["mode"] = 1.into();
@@ -263,7 +311,7 @@ fn points_and_lines_are_skipped() {
     b.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
     let model = read_glb(&b);
     assert_eq!(model.positions.len(), 16);
-    assert!(model.notices[0].contains("points or lines"));
+    assert!(model.notices[0].contains("1 primitive of lines: not shown"));
 }
 
 #[test]
@@ -289,7 +337,9 @@ fn trailing_bytes_and_missing_bin_padding_are_tolerated() {
     json["meshes"] = json!([]);
     json["nodes"] = json!([]);
     json["scenes"] = json!([{}]);
-    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("(points and lines"));
+    assert!(
+        read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("it has no triangles or points")
+    );
     json["animations"] = json!([{ "channels": [], "samplers": [] }]);
     assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("refit --skeleton"));
 }
@@ -357,7 +407,7 @@ fn extras_of_any_type_are_read_and_kept() {
         let (model, plain) = (read_glb(&b), read_glb(&skinned()));
         assert_eq!(model.positions, plain.positions);
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::X).collect();
-        let written = common::json_of(&model.write_glb(&moved).unwrap());
+        let written = json_of(&model.write_glb(&moved).unwrap());
         for place in &PLACES[..6] {
             assert_eq!(written.pointer(place).unwrap()["extras"], extras, "{place}");
         }

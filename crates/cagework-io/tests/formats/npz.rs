@@ -5,7 +5,10 @@ use std::io::{Cursor, Read as _, Write as _};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::field::{Field, Lattice};
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
-use cagework_io::{SavedWeights, UpAxis, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
+use cagework_io::{
+    FbxDisplacements, SavedWeights, UpAxis, read_weights_npz, write_displacements_npz, write_field_npz,
+    write_weights_npz, write_zip,
+};
 use glam::{DVec3, UVec3, Vec3};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -55,6 +58,41 @@ fn points_of_a_rig_are_the_last_rows() {
         .unwrap_err()
         .to_string();
     assert_eq!(message, "array 'extra_points': has 4 points, but the matrix has 3 rows");
+}
+
+#[test]
+fn displacements_have_three_arrays_per_mesh_and_names_in_unicode() {
+    let mesh = |node: &str, n: usize| FbxDisplacements {
+        node: node.into(),
+        mesh: "box".into(),
+        indices: vec![7; n],
+        positions: vec![[1.0, 2.0, 3.0]; n],
+        displacements: vec![vec![[0.0; 3]; n], vec![[0.0, 0.0, 0.5]; n]],
+    };
+    let bytes = write_displacements_npz(&["a".into(), "b".into()], &[mesh("é", 2), mesh("leg", 1)]);
+    let mut zip = ZipArchive::new(Cursor::new(bytes)).unwrap();
+    let mut array = |name: &str, kind: &str| {
+        let mut bytes = Vec::new();
+        zip.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
+        let (header, data) = bytes.split_at(128);
+        let header = std::str::from_utf8(&header[10..]).unwrap();
+        assert!(header.contains(kind), "{name}: {header}");
+        data.to_vec()
+    };
+    let names: Vec<u8> = "é\0\0leg".chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+    assert_eq!(array("nodes.npy", "'<U3', 'fortran_order': False, 'shape': (2,)"), names);
+    assert_eq!(array("poses.npy", "(2,)").len(), 8);
+    assert_eq!(
+        array("indices_0.npy", "'<i4', 'fortran_order': False, 'shape': (2,)"),
+        [7, 0, 0, 0, 7, 0, 0, 0]
+    );
+    assert_eq!(array("positions_1.npy", "(1, 3)"), [1.0, 2.0, 3.0_f32].map(f32::to_le_bytes).concat());
+    let last = [[0.0; 3], [0.0, 0.0, 0.5_f32]]
+        .as_flattened()
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect::<Vec<_>>();
+    assert_eq!(array("displacements_1.npy", "(2, 1, 3)"), last);
 }
 
 /// Arrays of a field whose displacements are `u = (0.1 y, 0.2 z, 0.3 x)`, in the axes of files with this up axis.

@@ -29,7 +29,7 @@ fn models() -> Vec<Model> {
     turned.set_up(UpAxis::Z);
     let splat: Vec<u8> = [1.0_f32, 2.0, 3.0, 0.1, 0.1, 0.1].iter().flat_map(|x| x.to_le_bytes()).collect();
     let splat = [splat, vec![255, 128, 0, 200, 255, 128, 128, 128]].concat();
-    let files: [(&str, Vec<u8>); 11] = [
+    let files: [(&str, Vec<u8>); 13] = [
         ("textured.glb", textured_square().glb()),
         ("skinned.glb", skinned().glb()),
         ("rigged.glb", rigged().glb()),
@@ -41,6 +41,8 @@ fn models() -> Vec<Model> {
         ("a.ply", PLY.into()),
         ("a.3mf", plate()),
         ("a.splat", splat),
+        ("a.spz", include_bytes!("../splats/helix-4.spz").to_vec()),
+        ("a.sog", include_bytes!("../splats/helix.sog").to_vec()),
     ];
     files.iter().map(|(name, bytes)| read(name, bytes)).chain([turned]).collect()
 }
@@ -74,6 +76,7 @@ fn restored_models_write_the_same_files() {
             (&model.positions, &model.triangles),
             "{name}"
         );
+        assert_eq!(restored.splats(), model.splats(), "{name}");
         let moved: Vec<Vec3> = model.positions.iter().map(|p| *p + Vec3::new(0.5 * p.y, 0.25, 0.0)).collect();
         for positions in [&model.positions, &moved] {
             for format in [model.format(), ModelFormat::Gltf, ModelFormat::Obj] {

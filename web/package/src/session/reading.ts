@@ -1,7 +1,6 @@
 /** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
 import type { BuiltSample, CageArrays, CheckedCage, Reading } from "../contract";
-import { extension } from "../names";
 import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
@@ -9,8 +8,8 @@ import type { Jobs, ReadModel } from "./messages";
 import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
 
-/** First bytes of a binary FBX file. */
-const FBX_BINARY = "Kaydara FBX Binary";
+/** Number of bytes at the start of a file that tell whether it is an FBX. */
+const START = 4096;
 
 type ReadListener = (step: Reading) => void;
 
@@ -128,7 +127,7 @@ export async function read(
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
   let file = content;
-  if (await isFbx(name, content)) {
+  if (pkg.LoadedModel.isFbx(name, await readBytes(name, content.slice(0, START)))) {
     say(tell, "convert");
     const { convert } = await loadPart(import("../fbx"));
     const { glb, notices } = await convert(name, await readBytes(name, content));
@@ -138,10 +137,4 @@ export async function read(
   const bytes = await toWasm(pkg, name, file, (share) => say(tell, "bytes", share));
   say(tell, "geometry");
   return pkg.LoadedModel.read(name, bytes, siblingOf(siblings));
-}
-
-/** Whether a file is an FBX: the module converts it before it reads it. */
-async function isFbx(name: string, content: Blob): Promise<boolean> {
-  const start = new TextDecoder().decode(await readBytes(name, content.slice(0, FBX_BINARY.length)));
-  return start === FBX_BINARY || (extension(name) === "fbx" && !start.startsWith("glTF"));
 }
