@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
+use crate::displacements::FbxDisplacements;
 use crate::gltf::{self, GltfError};
 use crate::memory::MemoryError;
 
@@ -47,21 +47,6 @@ pub(crate) fn convert(_: &[u8], _: u64) -> Result<Converted, FbxError> {
 /// Names of external images; empty if the file cannot be converted.
 pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     convert(bytes, memory_limit).map_or(Vec::new(), |fbx| gltf::named_files(&fbx.glb, memory_limit))
-}
-
-/// Displacements of the control points of a mesh, in the units and axes of the mesh in the FBX file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FbxDisplacements {
-    /// Name of the node that shows the mesh.
-    pub node: String,
-    /// Name of the mesh.
-    pub mesh: String,
-    /// Indices of the control points of faces, ascending. `[n_points]`
-    pub indices: Vec<u32>,
-    /// Positions at rest, without blend shapes. `[n_points, 3]`
-    pub positions: Vec<[f32; 3]>,
-    /// `[n_poses][n_points, 3]`
-    pub displacements: Vec<Vec<[f32; 3]>>,
 }
 
 /// Reads the last `n_poses` morph targets of a GLB that was written from an FBX file. Nodes that show the same mesh of the
@@ -112,18 +97,4 @@ pub fn fbx_displacements(glb: &[u8], n_poses: usize) -> Result<Vec<FbxDisplaceme
         });
     }
     Ok(all)
-}
-
-/// Writes displacements as JSON: `poses`, the names of the poses, and `meshes`, a list of [`FbxDisplacements`].
-///
-/// # Panics
-/// Never: the struct has no keys that JSON cannot represent.
-#[must_use]
-pub fn write_displacements_json(poses: &[String], meshes: &[FbxDisplacements]) -> Vec<u8> {
-    #[derive(Serialize)]
-    struct File<'a> {
-        poses: &'a [String],
-        meshes: &'a [FbxDisplacements],
-    }
-    serde_json::to_vec(&File { poses, meshes }).expect("the struct has text keys only")
 }

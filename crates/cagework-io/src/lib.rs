@@ -12,6 +12,7 @@
 mod archive;
 mod blender;
 mod counts;
+mod displacements;
 mod error;
 mod fbx;
 mod gltf;
@@ -45,8 +46,9 @@ mod up;
 
 pub use blender::write_field_blender;
 pub use counts::Counts;
+pub use displacements::{FbxDisplacements, write_displacements_json};
 pub use error::{PoseError, WriteError};
-pub use fbx::{FbxDisplacements, FbxError, fbx_displacements, write_displacements_json};
+pub use fbx::{FbxError, fbx_displacements};
 pub use gltf::{
     Clip, Feet, GltfError, Ground, JointPlayer, JointPoint, Joints, PROJECT_EXTENSION, Player,
     ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,

@@ -25,7 +25,7 @@ use glam::{DVec3, Mat3, UVec3, Vec3};
 use thiserror::Error;
 use zip::result::ZipError;
 
-use crate::fbx::FbxDisplacements;
+use crate::displacements::FbxDisplacements;
 use crate::memory::MemoryError;
 use crate::order::{Budget, Expansion};
 use crate::shown::shown;
