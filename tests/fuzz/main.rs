@@ -2,7 +2,8 @@
 //! error, within seconds and without a panic.
 //!
 //! `cargo xtask fuzz --minutes 60` takes the seed from the clock and prints it; `--seed 1` makes runs
-//! repeatable. Failing inputs are written to `target/fuzz`, and `cargo xtask fuzz FILE` repeats one. Inputs
+//! repeatable. `--page 60` reads the inputs with the page's wasm modules instead (`page.mjs`), once `cargo xtask page` has
+//! built them. Failing inputs are written to `target/fuzz`, and `cargo xtask fuzz FILE` repeats one. Inputs
 //! that failed in the past are in `found` and run first.
 //!
 //! A child process runs the inputs, since stack overflow and memory exhaustion end the process. It prints the
@@ -32,7 +33,7 @@ const MEMORY_KIB: &str = "4194304";
 /// Number of failed inputs after which the run ends.
 const MAX_FAILURES: u64 = 50;
 
-const USAGE: &str = "usage: cargo xtask fuzz [--minutes N] [--seed S] | FILE ...";
+const USAGE: &str = "usage: cargo xtask fuzz [--minutes N] [--seed S] | --page N | FILE ...";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
             }
             ExitCode::FAILURE
         }
+        ["--page", minutes] => fuzz_page(minutes),
         ["--write", seed] => {
             if let Ok(seed) = seed.parse() {
                 write_all(seed);
@@ -99,6 +101,14 @@ fn try_from(seed: u64, first: u64) {
         }
         survive::survive(&inputs.get(number));
     }
+}
+
+/// Runs inputs through the page's wasm modules, in Node.
+fn fuzz_page(minutes: &str) -> ExitCode {
+    let program = std::env::current_exe().expect("the executable has a path");
+    let ended =
+        Command::new("node").arg(root().join("tests/fuzz/page.mjs")).arg(program).arg(minutes).status();
+    if ended.is_ok_and(|status| status.success()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Writes inputs to stdout until it is closed, each with its length before it. Read by `page.mjs`.

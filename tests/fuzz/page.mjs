@@ -69,14 +69,14 @@ async function* inputsOf(stream) {
 /** Lets the worker read a file. */
 function ask(worker, bytes) {
   return new Promise((resolve) => {
-    const end = (answer) => {
-      clearTimeout(timer);
-      worker.removeAllListeners();
-      resolve(answer);
-    };
+    const fail = (error) => end({ failure: `the worker ended: ${error.message}` });
     const timer = setTimeout(() => end({ failure: `not done after ${MAX_SECONDS} s` }), 1000 * MAX_SECONDS);
-    worker.once("message", end);
-    worker.once("error", (error) => end({ failure: `the worker ended: ${error.message}` }));
+    function end(answer) {
+      clearTimeout(timer);
+      worker.off("message", end).off("error", fail);
+      resolve(answer);
+    }
+    worker.on("message", end).on("error", fail);
     worker.postMessage(bytes);
   });
 }

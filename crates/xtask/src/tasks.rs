@@ -47,7 +47,7 @@ pub(crate) fn test(tier: Tier) -> Result<(), String> {
     parts::end(began.elapsed()).and(outcome)
 }
 
-/// Runs what takes longest: the Blender extension, the notebooks, the evaluation, and an hour of damaged files.
+/// Runs what takes longest: the Blender extension, the notebooks, the evaluation, and two and a half hours of damaged files.
 pub(crate) fn test_long() -> Result<(), String> {
     let began = Instant::now();
     parts::begin()?;
@@ -55,8 +55,12 @@ pub(crate) fn test_long() -> Result<(), String> {
     part("notebooks", "cargo xtask notebooks", python::test_notebooks)?;
     let evaluation = ["test", "--locked", "--package", "cagework-benches", "--bin", "evaluate"];
     part("evaluation", &format!("cargo {}", evaluation.join(" ")), || run("cargo", &evaluation, &[]))?;
-    let hour = ["--minutes", "60"];
-    part("damaged files", &format!("cargo xtask fuzz {}", hour.join(" ")), || fuzz(&hour))?;
+    part("build of the page", "cargo xtask page", site::build)?;
+    for (name, args) in
+        [("damaged files", ["--minutes", "120"]), ("damaged files on the page", ["--page", "30"])]
+    {
+        part(name, &format!("cargo xtask fuzz {}", args.join(" ")), || fuzz(&args))?;
+    }
     parts::end(began.elapsed())
 }
 
