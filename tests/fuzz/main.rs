@@ -9,7 +9,6 @@
 //! A child process runs the inputs, since stack overflow and memory exhaustion end the process. It prints the
 //! number of each input before running it, so the parent knows which input failed.
 
-#[path = "../../crates/cagework-io/tests/common/mod.rs"]
 mod common;
 mod inputs;
 mod survive;
