@@ -6,7 +6,8 @@ import { cpSync, mkdtempSync, readFileSync, renameSync, rmSync, writeFileSync } 
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "@playwright/test";
-import { test as base, bound, drag, dropBox, expect, open, shoot } from "./support";
+import { fbx } from "./models";
+import { test as base, bound, drag, drop, dropBox, expect, open, shoot } from "./support";
 
 const DIST = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 
@@ -74,6 +75,10 @@ test("after the first visit everything works without a network", async ({ page, 
   await site.stop();
   await dropBox(page, "offline");
   await drag(page, 20, 10);
+  // Its converter is not needed before.
+  await drop(page, [{ name: "offline.fbx", bytes: fbx() }]);
+  await expect(page).toHaveTitle(/offline\.fbx/);
+  await bound(page);
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   await page.getByRole("button", { name: "Take the tour" }).click();
   await expect(page.getByText("What a cage does")).toBeVisible();
