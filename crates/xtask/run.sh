@@ -15,14 +15,24 @@ for row in "${debian_packages[@]}"; do
   read -r command packages <<<"$row"
   command -v "$command" >/dev/null || missing+=($packages)
 done
-# Tests of the page use Debian's Chromium, and Mesa's software OpenGL.
+# Prints the path of the first of these commands that is installed.
+first_of() { command -v "$@" | head -n 1; }
+# Tests of the page use an installed Chromium or Chrome, or else Debian's Chromium, and Mesa's software OpenGL.
 if [[ " test test-all page-test npm " == *" ${1:-} "* ]]; then
-  command -v chromium >/dev/null || missing+=(chromium)
+  export CHROMIUM=${CHROMIUM:-$(first_of chromium google-chrome || true)}
+  if [ -z "$CHROMIUM" ]; then
+    missing+=(chromium)
+    CHROMIUM=/usr/bin/chromium
+  fi
   compgen -G "/usr/lib/*/libEGL_mesa.so.0" >/dev/null || missing+=(libegl1 libgl1-mesa-dri)
 fi
-# Tests in Firefox need a virtual screen.
+# Tests in Firefox use the one that is installed, or else Debian's, and need a virtual screen.
 if [ "${1:-}" = test-all ]; then
-  command -v firefox-esr >/dev/null || missing+=(firefox-esr)
+  export FIREFOX=${FIREFOX:-$(first_of firefox-esr firefox || true)}
+  if [ -z "$FIREFOX" ]; then
+    missing+=(firefox-esr)
+    FIREFOX=/usr/bin/firefox-esr
+  fi
   command -v Xvfb >/dev/null || missing+=(xvfb)
 fi
 # Tests of the kernels need a Vulkan device, for example Mesa's software device.

@@ -50,6 +50,8 @@ pub use cage::{Cage, CageError, CageNotice, FaceDefect, subdivided_box};
 pub use controls::{ControlError, ControlSet, Controls, InnerControls, InnerElement};
 pub use coordinates::{ClosedFormError, Coordinates};
 pub use frames::Frames;
+/// Vectors and matrices of the public functions, in the version that the crates use.
+pub use glam;
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use options::BindOptions;
 pub use progress::{Cancellation, Progress, ProgressEvent, Stage};
