@@ -194,6 +194,12 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         let positions = positions_of(bytes).ok_or(damaged("a pose is cut off"))?;
         poses.push((pose["name"].as_str().unwrap_or_default().to_owned(), positions));
     }
+    let mut more = Vec::new();
+    for part in project["more"].as_array().into_iter().flatten() {
+        let bytes = view(part).ok_or(damaged("one of its models is cut off"))?;
+        left = left.checked_sub(bytes.len()).ok_or(damaged("its models share their bytes"))?;
+        more.push((part["name"].as_str().unwrap_or("model"), bytes));
+    }
     let settings = project["settings"].as_str().unwrap_or_default().to_owned();
     let mut model = if project["source"].is_object() {
         let source = view(&project["source"]).ok_or(damaged("its model is cut off"))?;
@@ -205,12 +211,9 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     };
     place(&mut model)?;
     let mut models = vec![model];
-    for part in project["more"].as_array().into_iter().flatten() {
-        let bytes = view(part).ok_or(damaged("one of its models is cut off"))?;
-        left = left.checked_sub(bytes.len()).ok_or(damaged("its models share their bytes"))?;
+    for (name, bytes) in more {
         let taken: u64 = models.iter().map(Model::bytes).sum();
         let free = memory_limit.saturating_sub(taken);
-        let name = part["name"].as_str().unwrap_or("model");
         let mut model = Model::read_within(name, bytes, &mut |_| None, free)?;
         model.require_faces()?;
         place(&mut model)?;
