@@ -10,7 +10,7 @@ import { join } from "node:path";
 import { isMainThread, parentPort, Worker } from "node:worker_threads";
 
 const MAX_SECONDS = 60;
-/** Wasm memory never shrinks. A new worker takes over before it reaches this size without a large file. */
+/** Limit on the memory of each module. Wasm memory never shrinks, so a worker above half of it is replaced. */
 const MAX_MEGABYTES = 1024;
 /** Limit of a conversion of FBX on the page, bytes (`fbx.ts`). */
 const FBX_MEMORY = 2 ** 31;

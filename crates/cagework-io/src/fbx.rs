@@ -49,13 +49,22 @@ pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     convert(bytes, memory_limit).map_or(Vec::new(), |fbx| gltf::named_files(&fbx.glb, memory_limit))
 }
 
+/// Memory of a number of the displacements while they are written, bytes: as it is, and as JSON.
+const BYTES_PER_NUMBER: usize = 4 + 16;
+
 /// Reads the last `n_poses` morph targets of a GLB that was written from an FBX file. Nodes that show the same mesh of the
-/// file have one item each. Empty if the GLB has no meshes of an FBX file.
+/// file have one item each. Empty if the GLB has no meshes of an FBX file. `memory_limit`: limit on the memory of the GLB
+/// and the result, bytes.
 ///
 /// # Errors
-/// If the GLB cannot be read.
-pub fn fbx_displacements(glb: &[u8], n_poses: usize) -> Result<Vec<FbxDisplacements>, GltfError> {
+/// If the GLB cannot be read, or the result needs more memory.
+pub fn fbx_displacements(
+    glb: &[u8],
+    n_poses: usize,
+    memory_limit: u64,
+) -> Result<Vec<FbxDisplacements>, GltfError> {
     let document = gltf::document_written("displacements.glb", glb)?;
+    let (mut held, mut longest) = (2 * glb.len() as u64, 0);
     let vectors = |accessor: &Value, scale: f64| -> Result<Vec<[f32; 3]>, GltfError> {
         let Some(accessor) = accessor.as_u64() else { return Ok(Vec::new()) };
         let values = document.source().floats::<3>(accessor as u32, "a position")?;
@@ -87,10 +96,15 @@ pub fn fbx_displacements(glb: &[u8], n_poses: usize) -> Result<Vec<FbxDisplaceme
                 points.entry(index as u32).or_insert_with(|| of(v).collect());
             }
         }
+        // An array of names in NPZ has 4 bytes per character of the longest name.
+        let mesh_name = mesh["name"].as_str().unwrap_or_default();
+        longest = name.len().max(mesh_name.len()).max(longest);
+        held += (points.len() * BYTES_PER_NUMBER * (1 + 3 * (1 + n_poses))) as u64;
+        MemoryError::check(held + 8 * (longest * (all.len() + 1)) as u64, memory_limit)?;
         let column = |k: usize| points.values().map(|of| of.get(k).copied().unwrap_or_default()).collect();
         all.push(FbxDisplacements {
             node: name.to_owned(),
-            mesh: mesh["name"].as_str().unwrap_or_default().to_owned(),
+            mesh: mesh_name.to_owned(),
             indices: points.keys().copied().collect(),
             positions: column(0),
             displacements: (1..=n_poses).map(column).collect(),

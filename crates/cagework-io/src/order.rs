@@ -89,7 +89,7 @@ impl Expansion {
     pub(crate) const TEXT: Self = Self { least: 64 * MIB, ratio: 100, most: u64::MAX };
     /// Splats. Compression typically shrinks them to 1/2 of their size, and a byte takes up to 22 bytes of memory while a
     /// cage is generated.
-    pub(crate) const SPLATS: Self = Self { least: 20 * MIB, ratio: 16, most: u64::MAX };
+    pub(crate) const SPLATS: Self = Self { least: 10 * MIB, ratio: 16, most: u64::MAX };
     /// Draco and meshopt, which typically shrink geometry to 1/10 of its size.
     pub(crate) const GEOMETRY: Self = Self { least: 256 * MIB, ratio: 100, most: 1024 * MIB };
 

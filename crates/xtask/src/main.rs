@@ -24,10 +24,12 @@ const USAGE: &str = "usage: cargo xtask TASK
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
   test           what a change needs: the Rust and TypeScript tests, and one story per step of the page in Chromium
   test-all       also the other tests of the page, Firefox, the packages, the glTF validator, damaged files
-  test-long      the Blender extension, the notebooks, the evaluation, and damaged files for two hours, and half an hour on the page
+  test-long      the Blender extension, the notebooks, the evaluation, damaged files for two hours, and for half an
+                 hour on the page
   check          format, lints, documentation, dependency arrows, import circles, types, biome
   fuzz [--minutes N] [--seed S] | --page N | FILE ...
-                 damaged files through all that reads them, with --page through the page's wasm modules; what fails is kept in target/fuzz, and FILE is tried again
+                 damaged files through all that reads them, with --page through the page's wasm modules; what fails
+                 is kept in target/fuzz, and FILE is tried again
   check-and-build  `check` during the build of the tests, with the compiler that `.ci/run` sets
   check-scripts  the part of `check` that is about TypeScript
   test-beside    the part of `test-all` that runs beside the Rust tests: TypeScript, Firefox, packages, the page's build

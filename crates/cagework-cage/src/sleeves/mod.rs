@@ -330,6 +330,10 @@ pub fn generate(
         if let Some(coarse) = enclosing {
             return Ok(coarse);
         }
+        // A model without a rig may be a soup, for which each attempt takes seconds and none succeeds.
+        if !skeleton.is_rigged && is_tangled && attempt > 0 {
+            return Err(why.into());
+        }
         if let Fault::Outside(points) = &fault
             && let Ok(cage) = finish(&fit, &units, skeleton, &coarse)
         {
@@ -339,10 +343,6 @@ pub fn generate(
         let mut learnt = remedies.clone();
         learnt.learn(&fit, &fault);
         next += 1;
-        // Models without a rig may be soups, for which each attempt takes seconds.
-        if !skeleton.is_rigged && is_tangled && attempt > 0 {
-            return Err(why.into());
-        }
         if skeleton.is_rigged && next >= FIRST_REMEDY && learnt.change_limbs(&fit, &fault) {
             // The rings to avoid were those of other limbs.
             learnt.avoided.clear();

@@ -165,7 +165,8 @@ fn displacements(
     let targets = Poses::Targets { base: None, all, timeline: None };
     job.check_memory_to_write(&targets, 0, args.read.memory.bytes()).map_err(of_output)?;
     let written = job.deform(bound, &targets).and_then(|deformed| job.write(deformed)).map_err(of_output)?;
-    let meshes = fbx_displacements(&written.bytes, names.len()).map_err(|e| CliError::file(&args.mesh, e))?;
+    let meshes = fbx_displacements(&written.bytes, names.len(), args.read.memory.bytes())
+        .map_err(|e| CliError::file(&args.mesh, e))?;
     if meshes.is_empty() {
         return Err(CliError::Mismatch {
             message: format!("{}: --displacements needs a model from an FBX file", shown_path(&args.mesh)),

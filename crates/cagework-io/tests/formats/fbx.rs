@@ -1,6 +1,6 @@
 //! FBX files, whose expected positions follow from the file by formula.
 
-use cagework_io::{Model, ModelFormat};
+use cagework_io::{Model, ModelFormat, fbx_displacements};
 use glam::{DVec2, Mat3, Vec3};
 use serde_json::{Value, json};
 
@@ -180,4 +180,14 @@ fn damaged_and_large_files_are_errors() {
     assert!(small.contains("its contents need more than the limit of"), "{small}");
     let none = read("box.fbx", b"; FBX 7.4.0 project file\nObjects: {\n}\n").unwrap_err().to_string();
     assert!(none.contains("it has no triangles"), "{none}");
+}
+
+/// In an NPZ, each name takes as much memory as the longest one.
+#[test]
+fn displacements_are_refused_before_they_exceed_the_memory_limit() {
+    let model = file(&placed());
+    let glb = model.write_glb(&model.positions).unwrap();
+    assert_eq!(fbx_displacements(&glb, 0, 1 << 20).unwrap().len(), 1);
+    let refused = fbx_displacements(&glb, 0, 2 * glb.len() as u64).unwrap_err().to_string();
+    assert!(refused.contains("of memory, more than the limit of"), "{refused}");
 }

@@ -339,7 +339,7 @@ fn damaged_sogs_are_refused() {
             with("sh0.webp", lossy),
             "its part 'sh0.webp' is a lossy image, which changes the numbers in it: write",
         ),
-        (with("sh0.webp", large), "more than the limit of 20 MiB or 16 times its size"),
+        (with("sh0.webp", large), "more than the limit of 10 MiB or 16 times its size"),
         (with("sh0.webp", b"\x89PNG"), "its part 'sh0.webp' is not a WebP image, or is damaged"),
         (with("quats.webp", &cut[..cut.len() - 4]), "its part 'quats.webp'"),
         (with("scales.webp", &webp([1, 1], &[])), "'scales.webp' has 1 x 1 pixels, fewer than the 2 splats"),

@@ -524,10 +524,10 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("declares 50000000 splats"));
     assert!(changed(8, &[0; 4]).contains("it has no splats"));
     assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));
-    // 14 MB of zeros in a small file: the limit is checked before they are decompressed.
+    // 10 MB of zeros in a small file: the limit is checked before they are decompressed.
     let mut bomb = body[..16].to_vec();
-    bomb[8..12].copy_from_slice(&500_000_u32.to_le_bytes());
-    bomb.resize(16 + 14_500_000, 0);
+    bomb[8..12].copy_from_slice(&340_000_u32.to_le_bytes());
+    bomb.resize(16 + 29 * 340_000, 0);
     let bomb = gzip(&bomb);
     let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
     assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");
@@ -535,7 +535,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     bomb[8..12].copy_from_slice(&2_400_000_u32.to_le_bytes());
     bomb.resize(16 + 29 * 2_400_000, 0);
     let unpacked = fault("a.spz", &gzip(&bomb));
-    assert!(unpacked.contains("unpack to 69600000, more than the limit of 20 MiB or 16 times"), "{unpacked}");
+    assert!(unpacked.contains("unpack to 69600000, more than the limit of 10 MiB or 16 times"), "{unpacked}");
 
     let bare = fault("a.spz", &body);
     assert!(
