@@ -6,6 +6,9 @@ import { splats } from "./models";
 import { difference, drawsNothing, pullsACapture, squares } from "./stories";
 import { bound, download, drop, expect, grip, openWith, pull, rested, shoot, test } from "./support";
 
+// Software draws splats slowly: its time is that of the pixels that they cover.
+test.use({ viewport: { width: 820, height: 520 } });
+
 test("a capture is pulled, exported and opened again", async ({ page }) => {
   await openWith(page, [{ name: "vase.splat", bytes: splats() }]);
   const pulled = await pullsACapture(page, "splats");
