@@ -7,12 +7,12 @@ const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
 export default defineConfig({
   testDir: "e2e",
   outputDir: "../target/e2e",
-  // Tests often wait for timers or a single thread: three tests in parallel keep two cores busy.
-  workers: process.env.FIGURES ? 1 : 3,
+  // A page draws with a software renderer of several threads: two tests in parallel keep two cores busy.
+  workers: process.env.FIGURES ? 1 : 2,
   fullyParallel: true,
   forbidOnly: true,
-  // On a busy machine, tests take several times as long as on an idle one.
-  timeout: 180_000,
+  // Only a hang takes this long. On a busy machine, tests take several times as long as on an idle one.
+  timeout: 300_000,
   retries: 0,
   expect: { timeout: 20_000 },
   reporter: [["list"]],
