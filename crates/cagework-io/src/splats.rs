@@ -6,6 +6,7 @@ pub(crate) mod ply;
 pub(crate) mod records;
 pub(crate) mod sog;
 pub(crate) mod spz;
+mod vp8l;
 
 use cagework_core::splats::Splats;
 use cagework_core::words::counted;

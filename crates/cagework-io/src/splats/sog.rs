@@ -11,6 +11,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
+use super::vp8l::n_code_groups;
 use super::{RawSplats, ReadSplats, Records, SplatError, SplatOrder, color_of, rotation_of, sigmoid};
 use crate::archive::{Archive, ArchiveError, fault_of, is_archive};
 use crate::npz::write_zip;
@@ -23,10 +24,8 @@ const META: &str = "meta.json";
 const MAX_META: usize = 1 << 20;
 /// Number of palette entries in a row of the image of spherical harmonics.
 const PALETTE_ROW: usize = 64;
-/// Memory of a group of Huffman tables of the image decoder, bytes, and the number of groups that libwebp's encoder writes
-/// at most (`MAX_HUFF_IMAGE_SIZE`), one per 16 pixels. Other tables take up to 550 times their size in the file.
+/// Memory that the image decoder needs for the tables of a group of prefix codes at most, bytes.
 const GROUP_BYTES: u64 = 24 << 10;
-const MAX_GROUPS: u64 = 2600;
 
 /// Content of `meta.json`.
 #[derive(Deserialize)]
@@ -201,6 +200,8 @@ struct Image<'a> {
     decoder: WebPDecoder<Cursor<Vec<u8>>>,
     /// Width and height.
     size: [usize; 2],
+    /// Number of groups of prefix codes; `None` if they are damaged.
+    n_groups: Option<u64>,
 }
 
 impl<'a> Image<'a> {
@@ -208,6 +209,7 @@ impl<'a> Image<'a> {
         let fault = |problem: &str| SplatError::Damaged(fault_of(name, problem));
         let index = archive.index(name).ok_or_else(|| fault("is missing"))?;
         let bytes = archive.unpack(name, index, 1, budget)?;
+        let n_groups = n_code_groups(&bytes);
         let mut decoder =
             WebPDecoder::new(Cursor::new(bytes)).map_err(|_| fault("is not a WebP image, or is damaged"))?;
         if decoder.is_lossy() || decoder.is_animated() {
@@ -215,7 +217,7 @@ impl<'a> Image<'a> {
             return Err(fault(if decoder.is_lossy() { lossy } else { "is an animation, not one image" }));
         }
         let (width, height) = decoder.dimensions();
-        Ok(Self { name, decoder, size: [width as usize, height as usize] })
+        Ok(Self { name, decoder, size: [width as usize, height as usize], n_groups })
     }
 
     fn n_pixels(&self) -> u64 {
@@ -224,9 +226,10 @@ impl<'a> Image<'a> {
 
     /// Decodes the pixels, by rows: red, green, blue and alpha.
     fn pixels(mut self) -> Result<Vec<[u8; 4]>, SplatError> {
+        let fault = || SplatError::Damaged(fault_of(self.name, "cannot be decoded: it is damaged"));
+        self.n_groups.ok_or_else(fault)?;
         let mut bytes = vec![0; self.decoder.output_buffer_size().unwrap_or(0)];
-        let fault = |_| SplatError::Damaged(fault_of(self.name, "cannot be decoded: it is damaged"));
-        self.decoder.read_image(&mut bytes).map_err(fault)?;
+        self.decoder.read_image(&mut bytes).map_err(|_| fault())?;
         // An image without an alpha channel is opaque.
         Ok(match self.decoder.has_alpha() {
             true => bytes.as_chunks::<4>().0.to_vec(),
@@ -263,9 +266,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     }
     let all = of_splats.chain(palette.as_ref().map(|palette| &palette.centroids));
     let n_pixels = all.clone().map(Image::n_pixels).fold(0, u64::saturating_add);
-    let largest = all.map(Image::n_pixels).max().unwrap_or(0);
-    // Pixels are in memory twice while they are decoded.
-    let window = 4 * n_pixels + GROUP_BYTES * MAX_GROUPS.min(1 + largest / 16);
+    // The images are decoded one after another. Pixels are in memory twice while they are decoded.
+    let n_groups = all.filter_map(|image| image.n_groups).max().unwrap_or(0);
+    let window = 4 * n_pixels + GROUP_BYTES * n_groups;
     let degree = palette.as_ref().map_or(0, |palette| palette.degree);
     let order = SplatOrder { count, degree, unpacked: 4 * n_pixels, window, counts: Vec::new() };
     let mut raw = RawSplats::new(&order.permit(&mut budget)?);

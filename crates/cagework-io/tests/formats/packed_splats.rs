@@ -333,6 +333,9 @@ fn damaged_sogs_are_refused() {
     let lossy = b"RIFF\x1a\0\0\0WEBPVP8 \x0e\0\0\0\xf0\xaf\0\x9d\x01\x2a\x02\x01\x04\x03\0\0\0\0";
     // The header of a lossless image of 16383 x 16383 pixels.
     let large = b"RIFF\x12\0\0\0WEBPVP8L\x05\0\0\0\x2f\xfe\xbf\xff\x0f\0";
+    // A lossless image of 2 x 1 pixels with one block, which has group 65535 of prefix codes: the decoder would build the
+    // tables of 65536 groups.
+    let groups = b"RIFF\x1a\0\0\0WEBPVP8L\x0d\0\0\0\x2f\x01\x00\x00\x00\x84\xfe\xf7\xbf\x00\x05\x28\x00\0";
     let cut = webp([2, 1], &[[1, 2, 3, 4]]);
     for (message, expected) in [
         (
@@ -340,6 +343,7 @@ fn damaged_sogs_are_refused() {
             "its part 'sh0.webp' is a lossy image, which changes the numbers in it: write",
         ),
         (with("sh0.webp", large), "more than the limit of 10 MiB or 16 times its size"),
+        (with("sh0.webp", groups), "it needs about 1537 MiB of memory"),
         (with("sh0.webp", b"\x89PNG"), "its part 'sh0.webp' is not a WebP image, or is damaged"),
         (with("quats.webp", &cut[..cut.len() - 4]), "its part 'quats.webp'"),
         (with("scales.webp", &webp([1, 1], &[])), "'scales.webp' has 1 x 1 pixels, fewer than the 2 splats"),
