@@ -119,7 +119,7 @@ function read(pkg, fbx, name, input) {
   }
   const bytes = new pkg.FileBytes(file.length);
   bytes.push(file);
-  const model = pkg.LoadedModel.read(name.replace("fbx", "glb"), bytes, () => undefined);
+  const model = pkg.LoadedModel.read(name.replace("fbx", "glb"), bytes, () => undefined, 0);
   model.prepare(0);
   const { cage, checkedPositions } = model;
   if (cage) pkg.Binder.checkCage(cage, checkedPositions);

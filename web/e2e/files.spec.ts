@@ -114,9 +114,11 @@ test("good files get a cage and can be dragged, bad files leave the model open a
       const file = new File(["glTF"], "huge.glb");
       Object.defineProperty(file, "size", { value: 5 * 2 ** 30 });
       const session = globalThis.cagework;
-      return session?.readFiles([{ name: file.name, path: file.name, file }], 0).done.catch((error) => {
-        document.body.dataset.refused = `${error.name}: ${error.message}`;
-      });
+      return session
+        ?.readFiles([{ name: file.name, path: file.name, file }], { pixels: 0, bytes: 0 })
+        .done.catch((error) => {
+          document.body.dataset.refused = `${error.name}: ${error.message}`;
+        });
     });
     await expect(page.locator("body")).toHaveAttribute("data-refused", /TooLarge: huge.glb has 5.0 GiB/);
   });

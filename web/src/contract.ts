@@ -4,4 +4,5 @@
  */
 
 export type * from "@cagework/core/contract";
+export type { Held } from "@cagework/core/session/messages";
 export type { OpenedFile, ReadFile, Session } from "./session";

@@ -4,7 +4,7 @@ import { startBind } from "@cagework/core/session/bind";
 import { type Client, createClient } from "@cagework/core/session/client";
 import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
-import type { ReadModel } from "@cagework/core/session/messages";
+import type { Held, ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenResult, openOn } from "@cagework/core/session/open";
 import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
 import type {
@@ -65,7 +65,7 @@ async function download(address: string, signal: AbortSignal | undefined): Promi
 export type Session = Awaited<ReturnType<typeof start>>;
 
 /** A file that a worker has read successfully. */
-export type ReadFile = Pick<ReadModel, "vertices" | "pixels">;
+export type ReadFile = Pick<ReadModel, "vertices" | "held">;
 
 /** What the page needs from a file whose models are in the engine. */
 export interface OpenedFile {
@@ -160,10 +160,16 @@ async function start(opened: OpenResult & Needs) {
     });
   };
 
+  /** What the open models take, without one of them. */
+  const held = (without?: number): Held => ({
+    pixels: engine.texturePixels(without),
+    bytes: engine.modelBytes(without),
+  });
+
   /** Reads a model from one file in a worker of its own. */
   const readOne = (name: string, content: Uint8Array | Blob, up?: UpAxis) => {
     const file = new Blob([content as BlobPart]);
-    return reading("read", { files: [{ name, path: name, file }], up, used: 0 }).done;
+    return reading("read", { files: [{ name, path: name, file }], up }).done;
   };
 
   async function openRead(
@@ -197,11 +203,11 @@ async function start(opened: OpenResult & Needs) {
     /**
      * Reads one model with its companion files, or a project GLB, in a worker of its own. Companion files in folders
      * are found by `path`. Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If
-     * reading fails or crashes, the open model is not affected. `used`: pixels of the textures of other models that are
-     * drawn together with this one.
+     * reading fails or crashes, the open model is not affected. `held`: what the models take that remain open.
      */
-    readFiles: (files: readonly NamedFile[], used: number, hear?: ReadListener): Job<ReadFile> =>
-      reading("read", { files, up: undefined, used }, hear),
+    readFiles: (files: readonly NamedFile[], held: Held, hear?: ReadListener): Job<ReadFile> =>
+      reading("read", { files, up: undefined, held }, hear),
+    held,
     /**
      * Until the returned function is called, one worker reads all files. The worker is replaced only after a failure.
      */
@@ -255,7 +261,7 @@ async function start(opened: OpenResult & Needs) {
      */
     copyRig(id: number, body: number, label: string, hear?: ReadListener): Job<{ readonly report: string }> {
       const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];
-      const job = reading("copyRig", { clothes, body: from, used: engine.texturePixels(id) }, hear);
+      const job = reading("copyRig", { clothes, body: from, held: held(id) }, hear);
       return chain(ofNow(job), async (read) => {
         const [loaded] = load(pkg, read);
         await engine.replace(id, loaded, label);

@@ -12,10 +12,12 @@ import type {
   CheckedCage,
   Command,
   Engine,
+  Held,
   Job,
   MemberInfo,
   ModelInfo,
   OpenedFile,
+  ReadFile,
   Session,
   View,
 } from "../src/contract";
@@ -62,6 +64,8 @@ export interface Fake {
   /** Replaces or adds functions of the engine. */
   teach(functions: Partial<Engine>): void;
 }
+
+const NOTHING: Held = { pixels: 0, bytes: 0 };
 
 const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
 
@@ -274,7 +278,11 @@ export function createFake(): Fake {
   const session: Partial<Session> = {
     engine,
     samples: ["rat"],
-    readFiles: (files) => job("read", files),
+    readFiles(files) {
+      const { done, cancel } = job<ReadFile>("read", files);
+      return { done: done.then((read) => ({ ...read, held: NOTHING })), cancel };
+    },
+    held: () => NOTHING,
     zip: (files) => Uint8Array.of(files.length),
     open: (read) => job<OpenedFile>("open", read).done,
     shareReader: () => () => {},

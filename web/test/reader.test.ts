@@ -30,7 +30,7 @@ it("each file is read by a worker of its own", async () => {
   const { opened, open } = workers();
   const apart = createSeparateWorkers(open);
   for (const k of [0, 1]) {
-    const job = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
+    const job = apart("read", { files: [file("a.obj")], up: undefined });
     opened[k]?.answer({ vertices: 3 });
     expect(await job.done).toEqual({ vertices: 3 });
     expect(opened[k]?.closed).toBeGreaterThan(0);
@@ -42,7 +42,7 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
   const { opened, open } = workers();
   const apart = createSeparateWorkers(open);
   const release = apart.share();
-  const read = () => apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
+  const read = () => apart("read", { files: [file("a.obj")], up: undefined });
   const first = read();
   opened[0]?.answer({ vertices: 3 });
   await first.done;
@@ -58,8 +58,8 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
 it("a cancellation or another file ends the current read", async () => {
   const { opened, open } = workers();
   const apart = createSeparateWorkers(open);
-  const first = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
-  const second = apart("read", { files: [file("b.obj")], up: undefined, used: 0 });
+  const first = apart("read", { files: [file("a.obj")], up: undefined });
+  const second = apart("read", { files: [file("b.obj")], up: undefined });
   await expect(first.done).rejects.toMatchObject({ name: "Cancelled" });
   expect(opened[1]?.closed).toBe(0);
   second.cancel();
@@ -69,10 +69,10 @@ it("a cancellation or another file ends the current read", async () => {
 it("a broken worker becomes a readable error; errors of the file are passed on", async () => {
   const { opened, open } = workers();
   const apart = createSeparateWorkers(open);
-  const broken = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
+  const broken = apart("read", { files: [file("a.obj")], up: undefined });
   opened[0]?.fail(named("Worker", "unreachable"));
   await expect(broken.done).rejects.toThrow("reading this file failed unexpectedly");
-  const bad = apart("read", { files: [file("b.obj")], up: undefined, used: 0 });
+  const bad = apart("read", { files: [file("b.obj")], up: undefined });
   opened[1]?.fail(named("Format", "not a GLB"));
   await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });
 });
@@ -82,7 +82,6 @@ it("a file above the size limit starts no worker", async () => {
   const job = createSeparateWorkers(open)("read", {
     files: [file("a.glb"), file("huge.bin", 5 * 2 ** 30)],
     up: undefined,
-    used: 0,
   });
   await expect(job.done).rejects.toThrow("huge.bin has 5.0 GiB");
   expect(opened.length).toBe(0);

@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use cagework_core::words::{size_rounded_down, size_rounded_up};
 use cagework_core::{PolygonMesh, TriMesh};
 use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{
     Look, LookAlpha, LookWrap, Model, ModelFormat, RestoreError, Store, StoredArrays, TexturePlan, UpAxis,
-    read_project, transfer_report,
+    read_project, shown, transfer_report,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
@@ -18,7 +19,7 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use crate::arrays::flat;
 use crate::cage::CageArrays;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{READ_LIMIT, decode};
+use crate::options::{HELD_LIMIT, READ_LIMIT, decode};
 use crate::views::{object, optional};
 
 /// The bytes of a file, copied into wasm memory in chunks, so that JavaScript never holds the whole file.
@@ -61,12 +62,23 @@ pub struct LoadedModel {
 #[wasm_bindgen]
 impl LoadedModel {
     /// Reads a model of any supported format, or a project. Call [`Self::prepare`] next. `sibling` is called with the
-    /// path of each file that the model refers to, and returns a Uint8Array or undefined.
+    /// path of each file that the model refers to, and returns a Uint8Array or undefined. `held`: memory of the other
+    /// models that are open, bytes.
     ///
     /// # Errors
-    /// If the file cannot be read.
-    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Answer<LoadedModel> {
-        Self::from_bytes(name, bytes.0, sibling)
+    /// If the file cannot be read, or the models would take more memory than a page holds.
+    pub fn read(name: &str, bytes: FileBytes, sibling: &Function, held: f64) -> Answer<LoadedModel> {
+        // A model takes at least the bytes of its file.
+        require_room(name, bytes.0.len() as u64, held as u64)?;
+        let loaded = Self::from_bytes(name, bytes.0, sibling)?;
+        require_room(name, loaded.bytes() as u64, held as u64)?;
+        Ok(loaded)
+    }
+
+    /// Approximate memory of all models of the file, bytes.
+    #[wasm_bindgen(getter)]
+    pub fn bytes(&self) -> f64 {
+        self.more.iter().fold(self.model.bytes() as f64, |sum, next| sum + next.model.bytes() as f64)
     }
 
     /// Whether a file that begins with `start` is an FBX, which is converted to a GLB before it is read.
@@ -137,7 +149,9 @@ impl LoadedModel {
 
     /// Converts the model to arrays, from which [`Self::restore`] recreates it in another instance of the module
     /// without reading its file. Call it after [`Self::prepare`] and [`Self::take_next`]. The cage is not included.
-    pub fn store(self) -> Vec<Uint8Array> {
+    pub fn store(mut self) -> Vec<Uint8Array> {
+        // Images are decoded before the model is stored.
+        self.look.images.iter_mut().for_each(|image| image.bytes = Vec::new());
         let mut store = Store::default();
         let names: Vec<&str> = self.poses.iter().map(|(name, _)| name.as_str()).collect();
         store.push_json(&(&self.settings, self.number, names));
@@ -233,6 +247,22 @@ impl LoadedModel {
     pub fn settings(&self) -> Option<String> {
         self.settings.clone()
     }
+}
+
+/// Checks that a model of `bytes` can be opened beside models of `held` bytes.
+fn require_room(name: &str, bytes: u64, held: u64) -> Answer<()> {
+    if held == 0 || held.saturating_add(bytes) <= HELD_LIMIT {
+        return Ok(());
+    }
+    let message = format!(
+        "{} takes {} of memory and the models that are open take {}, together more than the limit of {}: remove a model \
+         first, or use smaller ones",
+        shown(name),
+        size_rounded_up(bytes),
+        size_rounded_up(held),
+        size_rounded_down(HELD_LIMIT)
+    );
+    Err(Fault::new(ErrorName::Format, message))
 }
 
 impl LoadedModel {
@@ -377,5 +407,23 @@ impl LoadedModel {
             textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).map(Arc::new).collect(),
             splats: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_refused_beside_large_ones() {
+        let mib = 1 << 20;
+        assert!(require_room("a.glb", 900 * mib, 0).is_ok(), "a single model has a limit of its own");
+        assert!(require_room("a.glb", 41 * mib, 300 * mib).is_ok());
+        let refused = require_room("a.glb", 42 * mib, 300 * mib).unwrap_err();
+        assert_eq!(
+            refused.message(),
+            "a.glb takes 42 MiB of memory and the models that are open take 300 MiB, together more than the limit of \
+             341 MiB: remove a model first, or use smaller ones"
+        );
     }
 }

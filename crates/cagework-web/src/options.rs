@@ -17,6 +17,10 @@ use crate::views::object;
 /// use, because drawing and binding need memory too.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
+/// Limit on the memory of models that are open together, bytes. While models are opened, each is in memory three times: in
+/// the arrays from the worker, in the page's module and in the saved work.
+pub(crate) const HELD_LIMIT: u64 = READ_LIMIT / 3;
+
 /// Whether a bind runs on the CPU: because the options say so, the build has no WebGPU, or the solver has no GPU version.
 pub(crate) fn is_on_cpu(request: &PageBindOptions) -> bool {
     request.backend == Backend::Cpu

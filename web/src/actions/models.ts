@@ -44,8 +44,8 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       }
       ctx.tell.clear();
       const went = await attemptLatest(ctx, T.models.notAdded, "open", async (signal) => {
-        const used = ctx.engine().texturePixels();
-        const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", used);
+        const held = ctx.session().held();
+        const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", held);
         settle();
         const n = members().length;
         await models.join(reads, signal, T.did.addModels);

@@ -1,6 +1,6 @@
 /** Reads several models. If one cannot be read, its error is shown and the others are still read. */
 
-import type { Job, NamedFile, ReadFile, Reading } from "../contract";
+import type { Held, Job, NamedFile, ReadFile, Reading } from "../contract";
 import type { DropPlan } from "../drop";
 import { cancelled, isCancelled } from "../strings";
 import { T } from "../words";
@@ -26,17 +26,17 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
 /**
  * Reads models in sequence, each with its companion files. Shows an error for each model that cannot be read. Throws an
  * error named Cancelled if none can be read. `another`: what the button of an error message offers: to open another
- * file ("file") or to add one ("add"). `used`: pixels of the textures of the open models, if these remain open.
+ * file ("file") or to add one ("add"). `held`: what the open models take, if these remain open.
  */
 export async function readModels(
   ctx: Context,
   signal: AbortSignal,
   models: readonly (readonly NamedFile[])[],
   another: "file" | "add",
-  used = 0,
+  held: Held = { pixels: 0, bytes: 0 },
 ): Promise<ReadResult[]> {
   const what = T.opening.fileOf(models[0]?.[0]?.name ?? "", 0, models.length);
-  const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another, used));
+  const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another, held));
   if (reads.length === 0) throw cancelled("there is nothing to open");
   ctx.store.set({ busy: reads.length > 1 ? T.opening.joining(reads.length) : what });
   return reads;
@@ -47,7 +47,7 @@ function readAll(
   models: readonly (readonly NamedFile[])[],
   hear: (progress: Reading) => void,
   another: "file" | "add",
-  before: number,
+  before: Held,
 ): Job<{ reads: ReadResult[]; vertices: number }> {
   const release = ctx.session().shareReader();
   let isGivenUp = false;
@@ -55,7 +55,7 @@ function readAll(
   const work = async () => {
     const reads: ReadResult[] = [];
     let vertices = 0;
-    let used = before;
+    let held = before;
     for (const [k, own] of models.entries()) {
       if (isGivenUp) throw cancelled();
       const name = own[0]?.name ?? "";
@@ -66,10 +66,10 @@ function readAll(
         continue;
       }
       try {
-        const job = ctx.session().readFiles(own, used, hear);
+        const job = ctx.session().readFiles(own, held, hear);
         cancelOne = job.cancel;
         const read = await job.done;
-        used += read.pixels;
+        held = { pixels: held.pixels + read.held.pixels, bytes: held.bytes + read.held.bytes };
         vertices += read.vertices;
         reads.push({ name, read });
       } catch (error) {

@@ -60,7 +60,7 @@ impl PrefixCode {
     /// Reads the code of an alphabet of `n` symbols.
     fn read(bits: &mut Bits<'_>, n: usize) -> Option<Self> {
         if bits.flag()? {
-            return Self::read_simple(bits);
+            return Self::read_simple(bits, n);
         }
         const ORDER: [usize; 19] = [17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
         let mut lengths = [0; 19];
@@ -91,8 +91,8 @@ impl PrefixCode {
         (lengths.len() <= n).then(|| Self::of_lengths(&lengths))
     }
 
-    /// Reads the code of one or two symbols, whose codes have 0 or 1 bits.
-    fn read_simple(bits: &mut Bits<'_>) -> Option<Self> {
+    /// Reads the code of one or two symbols of an alphabet of `n`, whose codes have 0 or 1 bits.
+    fn read_simple(bits: &mut Bits<'_>, n: usize) -> Option<Self> {
         let two = bits.flag()?;
         let width = if bits.flag()? { 8 } else { 1 };
         let mut code = Self { symbols: vec![bits.take(width)?], ..Self::default() };
@@ -100,7 +100,7 @@ impl PrefixCode {
             code.symbols.push(bits.take(8)?);
         }
         code.counts[1] = code.symbols.len();
-        Some(code)
+        code.symbols.iter().all(|&symbol| symbol < n).then_some(code)
     }
 
     /// Reads a symbol.
@@ -246,6 +246,12 @@ mod tests {
         assert_eq!(n_code_groups(&file(&numbers)), Some(0x200));
         let without = [&size[..], &[(0, 3), (0, 1)]].concat();
         assert_eq!(n_code_groups(&file(&without)), Some(1));
+        // The distance of a copy has one of 40 prefixes.
+        let copied = |distance| {
+            let codes = [one(0), one(0), one(0), one(0), one(distance)].concat();
+            n_code_groups(&file(&[&size[..], &[(1, 1), (0, 2), (0, 3), (0, 1)], &codes, &[(0, 3)]].concat()))
+        };
+        assert_eq!((copied(39), copied(40)), (Some(1), None));
         let twice = [&size[..], &[(5, 3), (5, 3)]].concat();
         assert_eq!(n_code_groups(&file(&twice)), None);
         assert_eq!(n_code_groups(b"RIFF\0\0\0\0WEBP"), None);

@@ -83,6 +83,15 @@ impl Engine {
         })
     }
 
+    /// Approximate memory of the models, bytes, without one model.
+    #[wasm_bindgen(js_name = modelBytes)]
+    pub fn model_bytes(&self, without: Option<u32>) -> f64 {
+        self.read(|state| {
+            let others = state.models().iter().filter(|member| Some(member.id) != without);
+            others.map(|member| member.model.bytes() as f64).sum()
+        })
+    }
+
     /// Properties of the models, for panels.
     ///
     /// # Errors

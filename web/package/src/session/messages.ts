@@ -32,12 +32,17 @@ export interface Texture {
   readonly rgba: Uint8Array;
 }
 
+/** What models take: pixels of their textures, and memory of their files and arrays in bytes. */
+export interface Held {
+  readonly pixels: number;
+  readonly bytes: number;
+}
+
 /** A file that a worker has read successfully. */
 export interface ReadModel {
   /** Arrays of each model, for `LoadedModel.restore`. */
   readonly models: Uint8Array[][];
-  /** Total number of pixels of all textures. */
-  readonly pixels: number;
+  readonly held: Held;
   /** Textures of each model, by index; null for those that are missing or that this browser cannot decode. */
   readonly textures: readonly (readonly (Texture | null)[])[];
   /** The cage of a project. */
@@ -147,18 +152,18 @@ export interface Jobs {
     output: CheckedCage;
   };
   read: {
-    /** `used`: number of texture pixels of the other models that are drawn together with this one. */
-    input: { files: readonly NamedFile[]; up: UpAxis | undefined; used: number };
+    /** `held`: what the other models take that are open together with this one; nothing by default. */
+    input: { files: readonly NamedFile[]; up: UpAxis | undefined; held?: Held };
     step: Reading;
     output: ReadModel;
   };
   /**
    * Gives clothes the joints, joint weights and morph targets of a body. `clothes`, `body`: arrays of
-   * `Engine.storedModel`; `used`: number of texture pixels of the other models. `report`: a sentence about what was
+   * `Engine.storedModel`; `held`: what the other models take. `report`: a sentence about what was
    * copied.
    */
   copyRig: {
-    input: { clothes: Uint8Array[]; body: Uint8Array[]; used: number };
+    input: { clothes: Uint8Array[]; body: Uint8Array[]; held: Held };
     step: Reading;
     output: ReadModel & { readonly report: string };
   };

@@ -18,26 +18,26 @@ const say = (tell: ReadListener, stage: Reading["stage"], fraction = 0) => tell(
 /** Reads a model: converts it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
-  { files, up, used }: Jobs["read"]["input"],
+  { files, up, held = { pixels: 0, bytes: 0 } }: Jobs["read"]["input"],
   tell: ReadListener,
 ): Promise<ReadModel> {
   const notices: string[] = [];
-  const loaded = await read(pkg, files, tell, notices);
+  const loaded = await read(pkg, files, tell, notices, held.bytes);
   if (up) loaded.setUp(up);
-  const model = await packed(pkg, loaded, used, tell);
+  const model = await packed(pkg, loaded, held.pixels, tell);
   return { ...model, notices: [...notices, ...model.notices] };
 }
 
 /** Gives clothes the joints, joint weights and morph targets of a body. */
 export async function copyRig(
   pkg: Package,
-  { clothes, body, used }: Jobs["copyRig"]["input"],
+  { clothes, body, held }: Jobs["copyRig"]["input"],
   tell: ReadListener,
 ): Promise<Jobs["copyRig"]["output"]> {
   const [loaded, from] = [pkg.LoadedModel.restore(clothes), pkg.LoadedModel.restore(body)];
   const report = loaded.takeSkinOf(from);
   from.free();
-  return { ...(await packed(pkg, loaded, used, tell)), report };
+  return { ...(await packed(pkg, loaded, held.pixels, tell)), report };
 }
 
 /** Prepares all models of a file for drawing, copies them to arrays, and checks the cage of a project. */
@@ -62,9 +62,10 @@ async function packed(
   const positions = all.map((one) => one.checkedPositions);
   const vertices = positions.reduce((sum, { length }) => sum + length / 3, 0);
   const cage = mesh && checked(pkg, mesh, flat(positions));
+  const bytes = all.reduce((sum, one) => sum + one.bytes, 0);
   return {
     models: all.map((one) => one.store()),
-    pixels: drawn.reduce((sum, pixels) => sum + pixels, 0),
+    held: { pixels: drawn.reduce((sum, pixels) => sum + pixels, 0), bytes },
     textures: decoded.map(({ textures }) => textures),
     cage,
     notices: failed > 0 ? [notice] : [],
@@ -76,7 +77,7 @@ async function packed(
 export async function readSample(pkg: Package, name: string, sample: BuiltSample): Promise<ReadModel> {
   const bytes = new pkg.FileBytes(0);
   bytes.push(sample.glb);
-  const loaded = pkg.LoadedModel.read(name, bytes, () => undefined);
+  const loaded = pkg.LoadedModel.read(name, bytes, () => undefined, 0);
   const cage = checked(pkg, sample.cage, sample.positions);
   return { ...(await packed(pkg, loaded, 0, () => undefined)), cage };
 }
@@ -117,12 +118,13 @@ export function checked(pkg: Package, cage: CageArrays, model: Float32Array, smo
   return { ...cage, check: pkg.Binder.checkCage(model, { ...cage, controls }) };
 }
 
-/** Reads a file. Adds what a conversion lost to `lost`. */
+/** Reads a file. Adds what a conversion lost to `lost`. `held`: memory of the other models that are open, bytes. */
 export async function read(
   pkg: Package,
   files: Jobs["read"]["input"]["files"],
   tell: ReadListener,
   lost: string[] = [],
+  held = 0,
 ): Promise<LoadedModel> {
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
@@ -136,5 +138,5 @@ export async function read(
   }
   const bytes = await toWasm(pkg, name, file, (share) => say(tell, "bytes", share));
   say(tell, "geometry");
-  return pkg.LoadedModel.read(name, bytes, siblingOf(siblings));
+  return pkg.LoadedModel.read(name, bytes, siblingOf(siblings), held);
 }
