@@ -49,7 +49,8 @@ fn load(fbx: &[u8], shares: Shares) -> Result<SceneRoot, FbxError> {
         generate_missing_normals: true,
         node_depth_limit: MAX_DEPTH,
         geometry_transform_handling: GeometryTransformHandling::HelperNodes,
-        inherit_mode_handling: InheritModeHandling::HelperNodes,
+        // Additional nodes only for scales that are animated or not uniform.
+        inherit_mode_handling: InheritModeHandling::Compensate,
         space_conversion: SpaceConversion::ModifyGeometry,
         target_axes: CoordinateAxes {
             right: CoordinateAxis::PositiveX,

@@ -55,7 +55,10 @@ impl Nodes {
             let rest = Rest::of(&node.local_transform);
             n_faults += usize::from(rest.is_none());
             let children = node.children.iter().filter_map(|child| nodes.number(child)).collect();
-            nodes.add(&node.element.name, rest.unwrap_or(IDENTITY), children);
+            // A node that ufbx adds for a scale has no name. It takes the place of its parent as a joint.
+            let parent = node.parent.as_ref().filter(|_| node.is_scale_helper);
+            let name = parent.map_or(&node.element.name, |parent| &parent.element.name);
+            nodes.add(name, rest.unwrap_or(IDENTITY), children);
         }
         let of_root = scene.root_node.children.iter();
         nodes.roots = of_root.filter_map(|child| nodes.number(child)).collect();

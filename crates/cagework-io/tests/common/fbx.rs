@@ -228,10 +228,15 @@ const SECOND: i64 = 46_186_158_000;
 /// "tip", a child of it at the middle of the box's height. The clip turns "tip" by 90 degrees about x, and moves corner 0
 /// by the blend shape.
 pub(crate) fn rigged() -> Vec<Item> {
+    rigged_with(Vec::new(), Vec::new())
+}
+
+/// [`rigged`] with further properties of "root" and "tip".
+pub(crate) fn rigged_with(of_root: Vec<Item>, of_tip: Vec<Item>) -> Vec<Item> {
     let middle = BOX[2] / 2.0;
-    let limb = |id, name, z: f64| {
-        let at = vec![property("Lcl Translation", "Lcl Translation", &[0.0, 0.0, z])];
-        object("Model", id, name, "LimbNode", at, Vec::new())
+    let limb = |id, name, z: f64, mut properties: Vec<Item>| {
+        properties.push(property("Lcl Translation", "Lcl Translation", &[0.0, 0.0, z]));
+        object("Model", id, name, "LimbNode", properties, Vec::new())
     };
     let cluster = |id, name, indices: Vec<i32>, z: f64| {
         let moved = |z: f64| {
@@ -276,8 +281,8 @@ pub(crate) fn rigged() -> Vec<Item> {
     let mut objects = vec![
         geometry(1),
         object("Model", 2, "body", "Mesh", none(), none()),
-        limb(3, "root", 0.0),
-        limb(4, "tip", middle),
+        limb(3, "root", 0.0, of_root),
+        limb(4, "tip", middle, of_tip),
         object("Deformer", 5, "skin", "Skin", none(), none()),
         cluster(6, "lower", vec![0, 1, 2, 3], 0.0),
         cluster(7, "upper", vec![4, 5, 6, 7], middle),

@@ -5,7 +5,8 @@ use glam::{DVec2, Mat3, Vec3};
 use serde_json::{Value, json};
 
 use crate::common::fbx::{
-    self, BOX, Item, binary, connect, corners, geometry, object, placed, property, rigged, text, texture,
+    self, BOX, Item, binary, connect, corners, geometry, object, placed, property, rigged, rigged_with, text,
+    texture,
 };
 use crate::common::{PNG, json_of, read, volume};
 
@@ -166,6 +167,18 @@ fn skins_shapes_and_clips_move_as_in_the_file() {
             );
         }
     }
+}
+
+/// A joint can ignore the scale of its parent (`InheritType` 2). It stays a joint, and keeps its name and its place in the
+/// skeleton: an additional node would hide it from the search for a humanoid.
+#[test]
+fn joints_that_ignore_a_scale_keep_their_names() {
+    let ignoring = vec![property("InheritType", "enum", &[2.0])];
+    let model = file(&rigged_with(vec![property("Lcl Scaling", "Lcl Scaling", &[2.0; 3])], ignoring));
+    let rig = model.rest_rig().unwrap().unwrap();
+    let names: Vec<&str> = rig.joints.iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["root", "tip"]);
+    assert_eq!(rig.joints[1].parent, Some(0));
 }
 
 #[test]
