@@ -1,6 +1,6 @@
 //! Animation clips, baked to keys that glTF interpolates in the same way.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{Quat, Vec3};
 use serde_json::json;
@@ -9,10 +9,13 @@ use ufbx::{AnimStack, BakeOpts, BakedAnim, BakedAnimRoot, BakedQuat, BakedVec3, 
 use crate::document::Document;
 use crate::limits::{FbxError, Shares};
 use crate::mesh::Morphed;
-use crate::node::{Nodes, rotation, vector};
+use crate::node::{Nodes, Rest, rotation, vector};
 
 /// Property of a channel that is its weight, percent.
 const WEIGHT: &str = "DeformPercent";
+
+/// Name of the clip of a saved pose.
+const SAVED_POSE: &str = "saved pose";
 
 /// Range of [`sample_rate`], Hz. Between two samples, a movement bends little, and files stay small.
 const MIN_RATE: f64 = 30.0;
@@ -32,20 +35,24 @@ pub(crate) fn write(
     scene: &Scene,
     nodes: &Nodes,
     morphed: &[Morphed],
+    saved: &BTreeMap<usize, Rest>,
     shares: Shares,
     document: &mut Document,
 ) -> Result<(), FbxError> {
+    let mut n_clips = 0;
     for stack in &scene.anim_stacks {
         let baked = bake(scene, stack, shares)?;
         let mut clip = Clip { document, samplers: Vec::new(), channels: Vec::new(), range: range(&baked) };
-        clip.write_nodes(scene, &baked, nodes)?;
+        let mut still = saved.clone();
+        clip.write_nodes(scene, &baked, nodes, &mut still)?;
         clip.write_weights(&baked, morphed)?;
-        let Clip { samplers, channels, .. } = clip;
-        if !channels.is_empty() {
-            let name = &*stack.element.name;
-            document
-                .push("animations", json!({ "name": name, "samplers": samplers, "channels": channels }))?;
-        }
+        clip.hold(&still, nodes)?;
+        n_clips += usize::from(clip.finish(&stack.element.name)?);
+    }
+    if n_clips == 0 && !saved.is_empty() {
+        let mut clip = Clip { document, samplers: Vec::new(), channels: Vec::new(), range: [0.0; 2] };
+        clip.hold(saved, nodes)?;
+        clip.finish(SAVED_POSE)?;
     }
     Ok(())
 }
@@ -77,11 +84,73 @@ fn range(baked: &BakedAnim) -> [f64; 2] {
 }
 
 impl Clip<'_> {
-    /// Writes translations, rotations and scales.
-    fn write_nodes(&mut self, scene: &Scene, baked: &BakedAnim, nodes: &Nodes) -> Result<(), FbxError> {
+    /// Adds the clip to the document if it moves anything, and returns whether it does.
+    fn finish(self, name: &str) -> Result<bool, FbxError> {
+        let Self { document, samplers, channels, .. } = self;
+        if channels.is_empty() {
+            return Ok(false);
+        }
+        document.push("animations", json!({ "name": name, "samplers": samplers, "channels": channels }))?;
+        Ok(true)
+    }
+
+    /// Keeps nodes in these transforms, with one key each.
+    fn hold(&mut self, transforms: &BTreeMap<usize, Rest>, nodes: &Nodes) -> Result<(), FbxError> {
+        for (&node, held) in transforms {
+            let rest = nodes.rest[node];
+            self.write_vectors(&[0.0], &[held.translation], rest.translation, node, "translation")?;
+            self.write_vectors(&[0.0], &[held.scale], rest.scale, node, "scale")?;
+            self.write_rotations(&[0.0], &[held.rotation], rest.rotation, node)?;
+        }
+        Ok(())
+    }
+
+    /// Writes keys unless all equal the transform at rest.
+    fn write_vectors(
+        &mut self,
+        times: &[f32],
+        values: &[Vec3],
+        rest: Vec3,
+        node: usize,
+        path: &str,
+    ) -> Result<(), FbxError> {
+        let is_rest = values.iter().all(|value| value.abs_diff_eq(rest, 1e-6 * rest.length()));
+        if !is_rest && values.iter().all(|value| value.is_finite()) {
+            let values: Vec<[f32; 3]> = values.iter().map(Vec3::to_array).collect();
+            let values = self.document.floats(&values, None, false)?;
+            self.add(times, values, node, path)?;
+        }
+        Ok(())
+    }
+
+    fn write_rotations(
+        &mut self,
+        times: &[f32],
+        values: &[Quat],
+        rest: Quat,
+        node: usize,
+    ) -> Result<(), FbxError> {
+        let is_rest = values.iter().all(|value| value.dot(rest).abs() > 1.0 - 1e-7);
+        if !is_rest && values.iter().all(|value| value.is_finite()) {
+            let values: Vec<[f32; 4]> = values.iter().map(|value| value.to_array()).collect();
+            let values = self.document.floats(&values, None, false)?;
+            self.add(times, values, node, "rotation")?;
+        }
+        Ok(())
+    }
+
+    /// Writes translations, rotations and scales. Removes the nodes that the clip moves from `still`.
+    fn write_nodes(
+        &mut self,
+        scene: &Scene,
+        baked: &BakedAnim,
+        nodes: &Nodes,
+        still: &mut BTreeMap<usize, Rest>,
+    ) -> Result<(), FbxError> {
         for keys in &*baked.nodes {
             let node = scene.nodes.get(keys.typed_id as usize).and_then(|node| nodes.number(node));
             let Some(node) = node else { continue };
+            still.remove(&node);
             let rest = nodes.rest[node];
             let paths = [
                 ("translation", &keys.translation_keys, keys.constant_translation, rest.translation),
@@ -89,20 +158,10 @@ impl Clip<'_> {
             ];
             for (path, keys, is_constant, rest) in paths {
                 let (times, values) = self.cut_vectors(keys, is_constant);
-                let is_rest = values.iter().all(|value| value.abs_diff_eq(rest, 1e-6 * rest.length()));
-                if !is_rest && values.iter().all(|value| value.is_finite()) {
-                    let values: Vec<[f32; 3]> = values.iter().map(Vec3::to_array).collect();
-                    let values = self.document.floats(&values, None, false)?;
-                    self.add(&times, values, node, path)?;
-                }
+                self.write_vectors(&times, &values, rest, node, path)?;
             }
             let (times, values) = self.cut_rotations(&keys.rotation_keys, keys.constant_rotation);
-            let is_rest = values.iter().all(|value| value.dot(rest.rotation).abs() > 1.0 - 1e-7);
-            if !is_rest && values.iter().all(|value| value.is_finite()) {
-                let values: Vec<[f32; 4]> = values.iter().map(|value| value.to_array()).collect();
-                let values = self.document.floats(&values, None, false)?;
-                self.add(&times, values, node, "rotation")?;
-            }
+            self.write_rotations(&times, &values, rest.rotation, node)?;
         }
         Ok(())
     }

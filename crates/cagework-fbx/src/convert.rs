@@ -8,7 +8,7 @@ use ufbx::{
 
 use crate::document::Document;
 use crate::limits::{FbxError, MAX_DEPTH, Shares};
-use crate::{clip, material, mesh, node};
+use crate::{bind_pose, clip, material, mesh, node};
 
 /// A converted file.
 #[derive(Clone, Debug)]
@@ -32,8 +32,12 @@ pub fn convert(fbx: &[u8], memory_limit: u64) -> Result<Converted, FbxError> {
     let mut notices = warnings(&scene);
     let uv_sets = material::write(&scene, &mut document, &mut notices)?;
     let mut nodes = node::Nodes::new(&scene, &mut notices);
+    let saved = bind_pose::apply(&scene, &mut nodes);
     let morphed = mesh::write(&scene, &uv_sets, shares, &mut nodes, &mut document, &mut notices)?;
-    clip::write(&scene, &nodes, &morphed, shares, &mut document)?;
+    clip::write(&scene, &nodes, &morphed, &saved, shares, &mut document)?;
+    if !saved.is_empty() {
+        notices.push(bind_pose::NOTICE.to_owned());
+    }
     nodes.finish(&mut document)?;
     notices.extend(left_out(&scene));
     Ok(Converted { glb: document.finish()?, notices })

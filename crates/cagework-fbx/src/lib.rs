@@ -4,6 +4,7 @@
 //! inherited scales become transforms of nodes, some of them additional nodes. This crate writes what glTF can express,
 //! and lists the rest in notices.
 
+mod bind_pose;
 mod clip;
 mod convert;
 mod document;

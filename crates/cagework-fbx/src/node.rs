@@ -1,7 +1,7 @@
 //! The tree of nodes.
 
 use cagework_core::words::counted;
-use glam::{DQuat, DVec3, Quat, Vec3};
+use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
 use serde_json::{Map, Value, json};
 use ufbx::{Node, Scene, Transform};
 
@@ -90,6 +90,26 @@ impl Nodes {
         self.items.len() - 1
     }
 
+    /// Replaces the transform of a node at rest; returns the previous one.
+    pub(crate) fn set_rest(&mut self, number: usize, rest: Rest) -> Rest {
+        let Rest { translation, rotation, scale } = rest;
+        self.set(number, "translation", json!(translation.to_array()));
+        self.set(number, "rotation", json!(rotation.to_array()));
+        self.set(number, "scale", json!(scale.to_array()));
+        std::mem::replace(&mut self.rest[number], rest)
+    }
+
+    /// All nodes with their parents, parents first.
+    pub(crate) fn parents_first(&self) -> Vec<(usize, Option<usize>)> {
+        let mut order: Vec<(usize, Option<usize>)> = self.roots.iter().map(|&root| (root, None)).collect();
+        let mut next = 0;
+        while let Some(&(node, _)) = order.get(next) {
+            order.extend(self.children[node].iter().map(|&child| (child, Some(node))));
+            next += 1;
+        }
+        order
+    }
+
     /// Number of an FBX node; `None` for the root.
     pub(crate) fn number(&self, node: &Node) -> Option<usize> {
         self.numbers.get(node.element.typed_id as usize).copied().flatten()
@@ -164,8 +184,24 @@ impl Rest {
             rotation: rotation(transform.rotation),
             scale: vector(transform.scale),
         };
-        let Self { translation, rotation, scale } = rest;
-        (translation.is_finite() && rotation.is_finite() && scale.is_finite()).then_some(rest)
+        rest.is_finite().then_some(rest)
+    }
+
+    /// Translation, rotation and scale of a matrix; `None` unless all numbers are finite. Shear is left out.
+    pub(crate) fn of_matrix(matrix: &DMat4) -> Option<Self> {
+        let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
+        let rest =
+            Self { translation: translation.as_vec3(), rotation: rotation.as_quat(), scale: scale.as_vec3() };
+        rest.is_finite().then_some(rest)
+    }
+
+    pub(crate) fn matrix(&self) -> DMat4 {
+        let (scale, rotation) = (self.scale.as_dvec3(), self.rotation.as_dquat().normalize());
+        DMat4::from_scale_rotation_translation(scale, rotation, self.translation.as_dvec3())
+    }
+
+    fn is_finite(&self) -> bool {
+        self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite()
     }
 }
 

@@ -144,7 +144,29 @@ fn textures_that_gltf_cannot_express_are_named() {
 /// The clip turns the upper corners about x by 90 degrees per second, and moves corner 0 by 8 cm in a second.
 #[test]
 fn skins_shapes_and_clips_move_as_in_the_file() {
-    let model = file(&rigged());
+    moves_as_in_the_file(&file(&rigged()), 0.0);
+}
+
+/// Saved with a bent joint and a turned root, the box is opened as it was bound. The clip turns the joint only, and keeps the
+/// root as it was saved.
+#[test]
+fn a_figure_is_opened_in_the_pose_of_its_skin() {
+    let turned = |degrees: [f64; 3]| vec![property("Lcl Rotation", "Lcl Rotation", &degrees)];
+    let model = file(&rigged_with(turned([0.0, 30.0, 0.0]), turned([90.0, 0.0, 0.0])));
+    for &at in &model.positions {
+        let rest = metres(corners()[corner_at(at, |p| p)].map(|x| x as f32));
+        assert!(rest.distance(at) < 1e-6, "{at}, not {rest}");
+    }
+    assert!(model.notices.iter().any(|notice| notice.contains("another pose than that of its skin")));
+    moves_as_in_the_file(&model, 30.0);
+    // Below the limit of 20 degrees, the saved pose is kept.
+    let model = file(&rigged_with(Vec::new(), turned([10.0, 0.0, 0.0])));
+    assert!(!model.notices.iter().any(|notice| notice.contains("another pose")));
+}
+
+/// Checks the clip, with the root turned about y.
+fn moves_as_in_the_file(model: &Model, degrees: f32) {
+    let of_root = Mat3::from_rotation_y(degrees.to_radians());
     assert!(model.is_rigged());
     let clips = model.clips();
     assert_eq!(clips.iter().map(|clip| clip.name.as_deref()).collect::<Vec<_>>(), [Some("bend")]);
@@ -160,7 +182,7 @@ fn skins_shapes_and_clips_move_as_in_the_file() {
                 1..=3 => rest,
                 _ => middle + turn * (rest - middle),
             };
-            let expected = metres(expected.to_array());
+            let expected = metres((of_root * expected).to_array());
             assert!(
                 expected.distance(moved) < 1e-5,
                 "corner {corner} at {seconds} s: {moved}, not {expected}"
