@@ -4,15 +4,13 @@
 //! a clip. Where a joint is bent far, the blended matrices of its vertices are almost singular, and a change of the shape
 //! cannot be carried back to the bound vertices. The document is therefore at rest in the pose of its skins.
 
-use std::collections::BTreeMap;
-
-use glam::{DMat4, DQuat, DVec3};
-use ufbx::Scene;
+use glam::DVec3;
+use ufbx::{Matrix, Scene, matrix_invert, matrix_mul, matrix_to_transform, quat_dot, transform_to_matrix};
 
 use crate::node::{Nodes, Rest};
 
-/// Turn of a joint against the first joint of its skin, radians, above which the saved pose is not used: 20 degrees.
-const MAX_TURN: f64 = 0.35;
+/// Cosine of half the turn of a joint against the first joint of its skin, beyond which the saved pose is not used: 20 degrees.
+const MIN_COSINE: f64 = 0.984_8;
 /// Largest difference of two bound poses of a joint that are taken as equal: of axes, and of positions relative to the size
 /// of the skeleton. It is also the limit of the shear that translation, rotation and scale of a node cannot express.
 const TOLERANCE: f64 = 1e-3;
@@ -21,81 +19,77 @@ const TOLERANCE: f64 = 1e-3;
 pub(crate) const NOTICE: &str = "the FBX file was saved in another pose than that of its skin: it is opened in the pose of the \
     skin, and its clips show the saved one";
 
-/// Sets the rest pose to the pose of the skins if the saved one differs from it by more than [`MAX_TURN`]. Returns the saved
+/// Sets the rest pose to the pose of the skins if the saved one differs from it by more than [`MIN_COSINE`] allows. Returns the saved
 /// transforms of the nodes that it changes. It changes none if skins bind a joint in different poses.
-pub(crate) fn apply(scene: &Scene, nodes: &mut Nodes) -> BTreeMap<usize, Rest> {
-    changed(scene, nodes)
-        .map(|rests| rests.into_iter().map(|(node, rest)| (node, nodes.set_rest(node, rest))).collect())
-        .unwrap_or_default()
+pub(crate) fn apply(scene: &Scene, nodes: &mut Nodes) -> Vec<Option<Rest>> {
+    let rests = bound(scene, nodes).unwrap_or_default();
+    rests.into_iter().enumerate().map(|(node, rest)| Some(nodes.set_rest(node, rest?))).collect()
 }
 
-/// Rest transforms of the joints in the pose of the skins.
-fn changed(scene: &Scene, nodes: &Nodes) -> Option<Vec<(usize, Rest)>> {
-    let skins: Vec<Vec<(usize, DMat4)>> = scene
-        .skin_deformers
-        .iter()
-        .map(|skin| {
-            let clusters = skin.clusters.iter();
-            clusters
-                .filter_map(|c| Some((nodes.number(c.bone_node.as_ref()?)?, matrix(&c.bind_to_world))))
-                .collect()
-        })
-        .collect();
+/// Rest transform of each joint in the pose of the skins. `[n_nodes]`
+fn bound(scene: &Scene, nodes: &Nodes) -> Option<Vec<Option<Rest>>> {
     let order = nodes.parents_first();
-    let mut now = vec![DMat4::IDENTITY; nodes.rest.len()];
+    // Joints have a node: only the root of the scene has none.
+    let clusters = || scene.skin_deformers.iter().map(|skin| skin.clusters.iter());
+    let joint = |cluster: &ufbx::SkinCluster| nodes.number(cluster.bone_node.as_ref()?);
+    let mut now = vec![Matrix::default(); nodes.rest.len()];
     for &(node, parent) in &order {
-        now[node] = parent.map_or(DMat4::IDENTITY, |parent| now[parent]) * nodes.rest[node].matrix();
+        now[node] = below(&now, parent, &transform_to_matrix(&nodes.rest[node].transform()));
     }
-    let moved = skins.iter().any(|skin| {
-        let turns = skin.iter().map(|&(node, bound)| rotation(&(now[node] * bound.inverse())));
-        let turns: Vec<DQuat> = turns.collect();
-        turns.iter().any(|turn| turn.angle_between(turns[0]) > MAX_TURN)
-    });
-    if !moved {
+    let mut is_posed = false;
+    let mut bound: Vec<Option<Matrix>> = vec![None; now.len()];
+    let [mut least, mut most] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    for skin in clusters() {
+        let mut first = None;
+        for cluster in skin {
+            let Some(node) = joint(cluster) else { continue };
+            let matrix = cluster.bind_to_world;
+            let turn = matrix_to_transform(&matrix_mul(&now[node], &matrix_invert(&matrix))).rotation;
+            is_posed |= quat_dot(*first.get_or_insert(turn), turn).abs() < MIN_COSINE;
+            let at = DVec3::new(matrix.m03, matrix.m13, matrix.m23);
+            (least, most) = (least.min(at), most.max(at));
+            bound[node].get_or_insert(matrix);
+        }
+    }
+    let size = least.distance(most);
+    let is_agreed =
+        |cluster| joint(cluster).is_none_or(|node| is_same(bound[node], &cluster.bind_to_world, size));
+    if !is_posed || !clusters().flatten().all(|cluster| is_agreed(cluster)) {
         return None;
     }
-    let mut bound: BTreeMap<usize, DMat4> = BTreeMap::new();
-    for &(node, matrix) in skins.iter().flatten() {
-        bound.entry(node).or_insert(matrix);
-    }
-    let positions = bound.values().map(|matrix| matrix.w_axis.truncate());
-    let size = positions.clone().reduce(DVec3::max)?.distance(positions.reduce(DVec3::min)?);
-    let is_same = |a: &DMat4, b: &DMat4| {
-        let unit = a.x_axis.length().max(f64::MIN_POSITIVE);
-        let axes = [a.x_axis - b.x_axis, a.y_axis - b.y_axis, a.z_axis - b.z_axis];
-        axes.iter().all(|axis| axis.length() <= TOLERANCE * unit)
-            && (a.w_axis - b.w_axis).length() <= TOLERANCE * size
-    };
-    if !skins.iter().flatten().all(|(node, matrix)| is_same(&bound[node], matrix)) {
-        return None;
-    }
-    let mut rests = Vec::new();
+    let mut rests = vec![None; now.len()];
     for (node, parent) in order {
-        let above = parent.map_or(DMat4::IDENTITY, |parent| now[parent]);
-        let Some(&matrix) = bound.get(&node) else {
-            now[node] = above * nodes.rest[node].matrix();
+        let Some(matrix) = &bound[node] else {
+            now[node] = below(&now, parent, &transform_to_matrix(&nodes.rest[node].transform()));
             continue;
         };
-        let rest = Rest::of_matrix(&(above.inverse() * matrix))?;
-        now[node] = above * rest.matrix();
-        if !is_same(&matrix, &now[node]) {
+        let local = parent.map_or(*matrix, |parent| matrix_mul(&matrix_invert(&now[parent]), matrix));
+        let rest = Rest::of(&matrix_to_transform(&local))?;
+        now[node] = below(&now, parent, &transform_to_matrix(&rest.transform()));
+        if !is_same(Some(now[node]), matrix, size) {
             return None;
         }
-        rests.push((node, rest));
+        rests[node] = Some(rest);
     }
     Some(rests)
 }
 
-/// The rotation of a matrix without shear.
-fn rotation(matrix: &DMat4) -> DQuat {
-    matrix.to_scale_rotation_translation().1
+/// World transform of a node with this transform in its parent.
+fn below(world: &[Matrix], parent: Option<usize>, local: &Matrix) -> Matrix {
+    parent.map_or(*local, |parent| matrix_mul(&world[parent], local))
 }
 
-fn matrix(m: &ufbx::Matrix) -> DMat4 {
-    DMat4::from_cols_array_2d(&[
-        [m.m00, m.m10, m.m20, 0.0],
-        [m.m01, m.m11, m.m21, 0.0],
-        [m.m02, m.m12, m.m22, 0.0],
-        [m.m03, m.m13, m.m23, 1.0],
-    ])
+/// Whether two transforms of a joint are equal within [`TOLERANCE`].
+fn is_same(a: Option<Matrix>, b: &Matrix, size: f64) -> bool {
+    a.is_some_and(|a| {
+        let axes = [
+            ([a.m00, a.m10, a.m20], [b.m00, b.m10, b.m20]),
+            ([a.m01, a.m11, a.m21], [b.m01, b.m11, b.m21]),
+            ([a.m02, a.m12, a.m22], [b.m02, b.m12, b.m22]),
+        ];
+        let near = |(a, b): ([f64; 3], [f64; 3]), limit| DVec3::from(a).distance(b.into()) <= limit;
+        let unit = DVec3::from(axes[0].1).length();
+        axes.into_iter().all(|pair| near(pair, TOLERANCE * unit))
+            && near(([a.m03, a.m13, a.m23], [b.m03, b.m13, b.m23]), TOLERANCE * size)
+    })
 }

@@ -1,6 +1,6 @@
 //! Animation clips, baked to keys that glTF interpolates in the same way.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use glam::{Quat, Vec3};
 use serde_json::json;
@@ -35,7 +35,7 @@ pub(crate) fn write(
     scene: &Scene,
     nodes: &Nodes,
     morphed: &[Morphed],
-    saved: &BTreeMap<usize, Rest>,
+    saved: &[Option<Rest>],
     shares: Shares,
     document: &mut Document,
 ) -> Result<(), FbxError> {
@@ -43,7 +43,7 @@ pub(crate) fn write(
     for stack in &scene.anim_stacks {
         let baked = bake(scene, stack, shares)?;
         let mut clip = Clip { document, samplers: Vec::new(), channels: Vec::new(), range: range(&baked) };
-        let mut still = saved.clone();
+        let mut still = saved.to_vec();
         clip.write_nodes(scene, &baked, nodes, &mut still)?;
         clip.write_weights(&baked, morphed)?;
         clip.hold(&still, nodes)?;
@@ -95,8 +95,9 @@ impl Clip<'_> {
     }
 
     /// Keeps nodes in these transforms, with one key each.
-    fn hold(&mut self, transforms: &BTreeMap<usize, Rest>, nodes: &Nodes) -> Result<(), FbxError> {
-        for (&node, held) in transforms {
+    fn hold(&mut self, transforms: &[Option<Rest>], nodes: &Nodes) -> Result<(), FbxError> {
+        for (node, held) in transforms.iter().enumerate() {
+            let Some(held) = held else { continue };
             let rest = nodes.rest[node];
             self.write_vectors(&[0.0], &[held.translation], rest.translation, node, "translation")?;
             self.write_vectors(&[0.0], &[held.scale], rest.scale, node, "scale")?;
@@ -145,12 +146,14 @@ impl Clip<'_> {
         scene: &Scene,
         baked: &BakedAnim,
         nodes: &Nodes,
-        still: &mut BTreeMap<usize, Rest>,
+        still: &mut [Option<Rest>],
     ) -> Result<(), FbxError> {
         for keys in &*baked.nodes {
             let node = scene.nodes.get(keys.typed_id as usize).and_then(|node| nodes.number(node));
             let Some(node) = node else { continue };
-            still.remove(&node);
+            if let Some(held) = still.get_mut(node) {
+                *held = None;
+            }
             let rest = nodes.rest[node];
             let paths = [
                 ("translation", &keys.translation_keys, keys.constant_translation, rest.translation),

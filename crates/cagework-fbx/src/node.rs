@@ -1,7 +1,7 @@
 //! The tree of nodes.
 
 use cagework_core::words::counted;
-use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use serde_json::{Map, Value, json};
 use ufbx::{Node, Scene, Transform};
 
@@ -74,16 +74,7 @@ impl Nodes {
     fn add(&mut self, name: &str, rest: Rest, children: Vec<usize>) -> usize {
         let mut item = Map::new();
         item.insert("name".into(), name.into());
-        let Rest { translation, rotation, scale } = rest;
-        if translation != Vec3::ZERO {
-            item.insert("translation".into(), json!(translation.to_array()));
-        }
-        if rotation != Quat::IDENTITY {
-            item.insert("rotation".into(), json!(rotation.to_array()));
-        }
-        if scale != Vec3::ONE {
-            item.insert("scale".into(), json!(scale.to_array()));
-        }
+        rest.store(&mut item);
         self.items.push(item);
         self.children.push(children);
         self.rest.push(rest);
@@ -92,10 +83,7 @@ impl Nodes {
 
     /// Replaces the transform of a node at rest; returns the previous one.
     pub(crate) fn set_rest(&mut self, number: usize, rest: Rest) -> Rest {
-        let Rest { translation, rotation, scale } = rest;
-        self.set(number, "translation", json!(translation.to_array()));
-        self.set(number, "rotation", json!(rotation.to_array()));
-        self.set(number, "scale", json!(scale.to_array()));
+        rest.store(&mut self.items[number]);
         std::mem::replace(&mut self.rest[number], rest)
     }
 
@@ -178,30 +166,41 @@ impl Nodes {
 
 impl Rest {
     /// `None` unless all numbers are finite.
-    fn of(transform: &Transform) -> Option<Self> {
+    pub(crate) fn of(transform: &Transform) -> Option<Self> {
         let rest = Self {
             translation: vector(transform.translation),
             rotation: rotation(transform.rotation),
             scale: vector(transform.scale),
         };
-        rest.is_finite().then_some(rest)
+        let Self { translation, rotation, scale } = rest;
+        (translation.is_finite() && rotation.is_finite() && scale.is_finite()).then_some(rest)
     }
 
-    /// Translation, rotation and scale of a matrix; `None` unless all numbers are finite. Shear is left out.
-    pub(crate) fn of_matrix(matrix: &DMat4) -> Option<Self> {
-        let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
-        let rest =
-            Self { translation: translation.as_vec3(), rotation: rotation.as_quat(), scale: scale.as_vec3() };
-        rest.is_finite().then_some(rest)
+    /// Sets the transform of a node. What glTF takes for granted is left out.
+    fn store(&self, item: &mut Map<String, Value>) {
+        let Self { translation, rotation, scale } = *self;
+        let members = [
+            ("translation", json!(translation.to_array()), translation == Vec3::ZERO),
+            ("rotation", json!(rotation.to_array()), rotation == Quat::IDENTITY),
+            ("scale", json!(scale.to_array()), scale == Vec3::ONE),
+        ];
+        for (name, value, is_default) in members {
+            item.remove(name);
+            if !is_default {
+                item.insert(name.into(), value);
+            }
+        }
     }
 
-    pub(crate) fn matrix(&self) -> DMat4 {
-        let (scale, rotation) = (self.scale.as_dvec3(), self.rotation.as_dquat().normalize());
-        DMat4::from_scale_rotation_translation(scale, rotation, self.translation.as_dvec3())
-    }
-
-    fn is_finite(&self) -> bool {
-        self.translation.is_finite() && self.rotation.is_finite() && self.scale.is_finite()
+    pub(crate) fn transform(&self) -> Transform {
+        let Self { translation, rotation, scale } = *self;
+        let three = |v: Vec3| ufbx::Vec3 { x: v.x.into(), y: v.y.into(), z: v.z.into() };
+        let [x, y, z, w] = rotation.to_array().map(f64::from);
+        Transform {
+            translation: three(translation),
+            rotation: ufbx::Quat { x, y, z, w },
+            scale: three(scale),
+        }
     }
 }
 
