@@ -11,7 +11,7 @@ export default defineConfig({
   workers: process.env.FIGURES ? 1 : 2,
   fullyParallel: true,
   forbidOnly: true,
-  // Only a hang takes this long. On a busy machine, tests take several times as long as on an idle one.
+  // A limit for hangs. On a busy machine, tests take several times as long as on an idle one.
   timeout: 300_000,
   retries: 0,
   expect: { timeout: 20_000 },

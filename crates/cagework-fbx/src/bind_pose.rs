@@ -2,7 +2,7 @@
 //!
 //! An FBX file stores the pose in which a skin was bound and the pose in which the figure was saved, often the first frame of
 //! a clip. Where a joint is bent far, the blended matrices of its vertices are almost singular, and a change of the shape
-//! cannot be carried back to the bound vertices. The document is therefore at rest in the pose of its skins.
+//! cannot be carried back to the bound vertices. Such a file is therefore at rest in the pose of its skins.
 
 use glam::DVec3;
 use ufbx::{Matrix, Scene, matrix_invert, matrix_mul, matrix_to_transform, quat_dot, transform_to_matrix};
@@ -17,19 +17,20 @@ const TOLERANCE: f64 = 1e-3;
 
 /// Notice about a saved pose that is not the rest pose.
 pub(crate) const NOTICE: &str = "the FBX file was saved in another pose than that of its skin: it is opened in the pose of the \
-    skin, and its clips show the saved one";
+    skin, and clips keep joints that they do not move as they were saved";
 
-/// Sets the rest pose to the pose of the skins if the saved one differs from it by more than [`MIN_COSINE`] allows. Returns the saved
-/// transforms of the nodes that it changes. It changes none if skins bind a joint in different poses.
+/// Sets the rest pose to the pose of the skins if a joint was saved with a larger turn than that of [`MIN_COSINE`]. Returns
+/// the saved transform of each node that it changes, or an empty list. It changes none if two skins bind a joint in
+/// different poses. `[n_nodes]`
 pub(crate) fn apply(scene: &Scene, nodes: &mut Nodes) -> Vec<Option<Rest>> {
     let rests = bound(scene, nodes).unwrap_or_default();
     rests.into_iter().enumerate().map(|(node, rest)| Some(nodes.set_rest(node, rest?))).collect()
 }
 
-/// Rest transform of each joint in the pose of the skins. `[n_nodes]`
+/// Rest transform of each joint in the pose of the skins; `None` if the saved pose stays. `[n_nodes]`
 fn bound(scene: &Scene, nodes: &Nodes) -> Option<Vec<Option<Rest>>> {
     let order = nodes.parents_first();
-    // Joints have a node: only the root of the scene has none.
+    // The root of the scene has no node, and stays where it is.
     let clusters = || scene.skin_deformers.iter().map(|skin| skin.clusters.iter());
     let joint = |cluster: &ufbx::SkinCluster| nodes.number(cluster.bone_node.as_ref()?);
     let mut now = vec![Matrix::default(); nodes.rest.len()];
