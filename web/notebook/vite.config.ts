@@ -12,12 +12,14 @@ import { LICENCES } from "../vite.config";
 const here = import.meta.dirname;
 const source = join(here, "../package/src");
 
-/** Replaces the module that downloads the wasm file. */
-const open: Plugin = {
-  name: "open",
+/** Replaces the modules that download wasm files. Python converts FBX files, so the notebook receives none. */
+const downloads = (): Plugin => ({
+  name: "downloads",
   enforce: "pre",
-  resolveId: (id) => (id.endsWith("session/open") ? join(here, "open.ts") : undefined),
-};
+  resolveId: (id) =>
+    id.endsWith("session/open") ? join(here, "open.ts") : id.endsWith("/fbx") ? "\0none" : undefined,
+  load: (id) => (id === "\0none" ? "export {};" : undefined),
+});
 
 /** Removes the URLs of the wasm file and the worker, because Vite would embed both files. */
 const noAddresses = (): Plugin => ({
@@ -41,9 +43,9 @@ const compressed: Plugin = {
 
 export default defineConfig({
   root: here,
-  plugins: [open, noAddresses(), compressed],
+  plugins: [downloads(), noAddresses(), compressed],
   resolve: { alias: { "@cagework/core": source } },
-  worker: { format: "iife", plugins: () => [noAddresses()] },
+  worker: { format: "iife", plugins: () => [downloads(), noAddresses()] },
   build: {
     outDir: join(here, "../../crates/cagework-py/notebook/cagework_notebook/files"),
     emptyOutDir: true,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
 use cagework_core::rig::Rig;
-use cagework_io::{Clip, Model, Resolve, shown};
+use cagework_io::{Clip, Model, ModelFormat, Resolve, shown};
 use glam::DVec3;
 use numpy::PyArray2;
 use pyo3::exceptions::PyTypeError;
@@ -184,4 +184,26 @@ pub(crate) fn read_model<'py>(
         Ok((positions, triangles, origin.ok_or_else(|| error::model("the list of models is empty"))?))
     })??;
     Ok((arrays::array_of(py, positions, origin)?, arrays::triples(py, &triangles)?))
+}
+
+/// Returns the GLB of an unmoved model in a glTF or FBX file, which needs no other files. `None` for other formats. A GLB
+/// without other files is returned as it is.
+///
+/// For `cagework_notebook`, which sends a single file to the notebook. The vertices are those of `read_model`.
+///
+/// Raises `OSError`, `ModelError`.
+#[pyfunction]
+pub(crate) fn to_glb<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+) -> PyResult<Option<Bound<'py, PyBytes>>> {
+    let source = Source::of("model", model)?;
+    let glb = work::run(py, move |_| -> PyResult<_> {
+        let model = source.read()?;
+        if model.format() != ModelFormat::Gltf || model.triangles.is_empty() {
+            return Ok(None);
+        }
+        model.write_glb(&model.positions).map(Some).map_err(error::model)
+    })??;
+    Ok(glb.map(|glb| PyBytes::new(py, &glb)))
 }

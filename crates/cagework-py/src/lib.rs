@@ -31,7 +31,7 @@ mod native {
     #[pymodule_export]
     use crate::field::Field;
     #[pymodule_export]
-    use crate::files::read_model;
+    use crate::files::{read_model, to_glb};
     #[pymodule_export]
     use crate::proportions::{humanoid_bones, proportions};
     #[pymodule_export]

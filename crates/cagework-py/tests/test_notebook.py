@@ -1,8 +1,12 @@
 """The notebook widget without a notebook. `cargo xtask notebooks` tests it in JupyterLab."""
 
+import json
+import struct
+
 import cagework_notebook
 import numpy as np
 import pytest
+import support
 
 import cagework as cw
 
@@ -21,6 +25,49 @@ def test_widget_sends_the_model_its_cage_and_all_weights(widget, model, cage, bo
     np.testing.assert_array_equal(np.frombuffer(sent["positions"]).reshape(-1, 3), cage.vertices)
     assert sent["name"] == "model.ply" and len(sent["data"]) == len(sent["indices"]) == 4 * bound[0].nnz
     assert np.frombuffer(sent["corners"], "u4").size == sum(1 + len(face) for face in cage.faces)
+
+
+# A tetrahedron in centimetres with y up, as FBX text.
+FBX = b"""; FBX 7.4.0 project file
+FBXHeaderExtension: {
+  FBXVersion: 7400
+}
+Objects: {
+  Geometry: 1, "Geometry::tetra", "Mesh" {
+    Vertices: *12 {
+      a: 100,100,100,-100,-100,100,-100,100,-100,100,-100,-100
+    }
+    PolygonVertexIndex: *12 {
+      a: 0,1,-4,0,2,-2,0,3,-3,1,2,-4
+    }
+  }
+  Model: 2, "Model::tetra", "Mesh" {
+  }
+}
+Connections: {
+  C: "OO", 2, 0
+  C: "OO", 1, 2
+}
+"""
+
+
+def test_models_are_sent_as_one_file_with_the_same_vertices(tmp_path):
+    glb = support.rigged_glb()
+    length = struct.unpack_from("<I", glb, 12)[0]
+    document = json.loads(glb[20 : 20 + length])
+    document["buffers"][0]["uri"] = "figure.bin"
+    (tmp_path / "figure.bin").write_bytes(glb[28 + length :])
+    (tmp_path / "figure.gltf").write_text(json.dumps(document))
+    (tmp_path / "figure.glb").write_bytes(glb)
+    (tmp_path / "tetra.fbx").write_bytes(FBX)
+    for model in (tmp_path / "figure.gltf", tmp_path / "figure.glb", glb, tmp_path / "tetra.fbx", FBX):
+        vertices, triangles = cw.read_model(model)
+        sent = cw.show(model, cw.generate_cage(vertices, triangles, target=20))._sent
+        assert sent["file"][:4] == b"glTF" and sent["name"].endswith(".glb")
+        for before, after in zip((vertices, triangles), cw.read_model(sent["file"]), strict=True):
+            np.testing.assert_array_equal(before, after)
+        assert sent["file"] == glb or model not in (glb, tmp_path / "figure.glb")
+    np.testing.assert_allclose(cw.read_model(FBX)[0].max(axis=0), 1)
 
 
 def test_offset_columns_of_outside_points_follow_those_of_the_cage(model, cage):

@@ -13,6 +13,7 @@ import traitlets
 from scipy.sparse import hstack
 
 import cagework as cw
+from cagework._native import to_glb
 
 __all__ = ["CageWidget", "show"]
 __version__ = "0.1.0"
@@ -123,12 +124,11 @@ def _plain(report: dict[str, Any]) -> dict[str, Any]:
 
 def _read(model: Any) -> tuple[str, bytes, np.ndarray | None]:
     """The name and bytes of a model's file, and its vertices if it was given by arrays."""
-    if isinstance(model, bytes):
-        # The format is recognised by its first bytes.
-        return ("model.glb" if model[:4] == b"glTF" else "model"), model, None
-    if isinstance(model, (str, PathLike)):
-        path = Path(model)
-        return path.name, path.read_bytes(), None
+    if isinstance(model, (bytes, str, PathLike)):
+        # The format of bytes is recognised by the first of them.
+        name, data = ("model", model) if isinstance(model, bytes) else (Path(model).name, Path(model).read_bytes())
+        glb = to_glb(model)
+        return (name, data, None) if glb is None else (f"{Path(name).stem}.glb", glb, None)
     vertices, triangles = (model.vertices, model.faces) if hasattr(model, "vertices") else model
     vertices, triangles = np.asarray(vertices), np.asarray(triangles)
     for name, array in (("vertices", vertices), ("triangles", triangles)):

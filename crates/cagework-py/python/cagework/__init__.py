@@ -63,8 +63,8 @@ def show(model: Any, cage: Cage, weights: Any = None, report: dict[str, Any] | N
     """Draws a model in its cage in a notebook: show(model, cage, weights=None, report=None, *, theme="auto", height=400) -> widget
 
     model: path of a file or its bytes, with its materials; or a mesh, which is (vertices, triangles) or an object with vertices and
-    faces. A .gltf must contain its buffers. weights and report: the result of bind; without them, the model is bound here. theme:
-    "auto", "dark" or "light"; height: CSS pixels.
+    faces. weights and report: the result of bind; without them, the model is bound here. theme: "auto", "dark" or "light"; height:
+    CSS pixels.
 
     The widget's pose is the cage's vertices, [n_cage, 3] float64, object units. Drag vertices in the notebook, or assign a pose.
     widget.observe(function, "pose") calls a function at each change. The array is read-only: copy it to change numbers. deformed: the

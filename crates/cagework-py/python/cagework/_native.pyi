@@ -145,6 +145,7 @@ def proportions(
 def read_model(
     model: _Model | list[_Model], states: bool = False, clip: str | None = None
 ) -> tuple[NDArray[np.float32] | NDArray[np.float64], NDArray[np.int32]]: ...
+def to_glb(model: _Model) -> bytes | None: ...
 def reshape(
     model: _Model,
     cage: Cage,
