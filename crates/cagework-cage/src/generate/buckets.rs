@@ -15,6 +15,8 @@ pub(super) struct Buckets {
     met: Vec<(u32, u32)>,
     lists_read: u32,
     searches: u32,
+    /// Number of lists that searches have read, plus the number of their entries: the work of all searches.
+    pub(super) visits: u64,
 }
 
 impl Buckets {
@@ -28,6 +30,7 @@ impl Buckets {
             met: vec![(0, 0); n],
             lists_read: 0,
             searches: 0,
+            visits: 0,
         }
     }
 
@@ -68,6 +71,7 @@ impl Buckets {
                     let bucket = bucket_bounds(origin, dims, [x, y, z]);
                     let mut list = std::mem::take(&mut self.lists[slot]);
                     self.lists_read += 1;
+                    self.visits += 1 + list.len() as u64;
                     let read = self.lists_read;
                     list.retain(|&t| {
                         let Some((low, high)) = bounds(t) else { return false };

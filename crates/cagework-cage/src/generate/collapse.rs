@@ -72,6 +72,8 @@ pub(super) struct Collapser<'g, 'a> {
     pub(super) budget: Option<f64>,
     /// Whether to limit the spacing of vertices on plates (thin flat parts; see [`Spacing`]).
     pub(super) keeps_plates: bool,
+    /// Limit on [`GuardedSurface::visits`], at which no more edges are collapsed.
+    pub(super) max_visits: u64,
     /// Limit on the distance of each vertex from its neighbours, if it lies on a limb or plate.
     pub(super) spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
@@ -120,6 +122,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
             planes,
             budget: None,
             keeps_plates: false,
+            max_visits: u64::MAX,
             spacings,
             version: vec![0; n],
             heap: BinaryHeap::new(),
@@ -138,7 +141,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
     }
 
-    /// Collapses edges until `target` vertices are left or no edge can be collapsed. Returns the number of vertices.
+    /// Collapses edges until `target` vertices are left, no edge can be collapsed or the searches
+    /// reach [`Self::max_visits`]. Returns the number of vertices.
     ///
     /// # Errors
     /// If `go_on`, called with the completed share, cancels.
@@ -151,7 +155,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.wait_for_all();
         let before = self.count;
         let (mut steps, mut count_then) = (0, before);
-        while self.count > target {
+        while self.count > target && !self.is_exhausted() {
             let Some(waiting) = self.heap.pop() else {
                 if self.count == count_then || self.surface.has_band() {
                     break;
@@ -186,6 +190,11 @@ impl<'g, 'a> Collapser<'g, 'a> {
 
     /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. The vertex on more
     /// mirror planes remains.
+    /// Whether the searches have reached [`Self::max_visits`].
+    pub(super) fn is_exhausted(&self) -> bool {
+        self.surface.visits() >= self.max_visits
+    }
+
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         let n_planes = |v: u32| self.surface.on_mirror[v as usize].len();
         if n_planes(b) >= n_planes(a) && n_planes(b) > 0 { (b, a) } else { (a, b) }

@@ -173,6 +173,11 @@ impl<'a> GuardedSurface<'a> {
         surface
     }
 
+    /// Work of the searches for near triangles until now ([`Buckets::visits`]).
+    pub(super) fn visits(&self) -> u64 {
+        self.buckets.visits
+    }
+
     pub(super) fn is_alive(&self, triangle: u32) -> bool {
         self.bounds[triangle as usize].is_some()
     }

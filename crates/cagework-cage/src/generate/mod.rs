@@ -34,6 +34,8 @@ mod unfold;
 mod verify;
 mod voxels;
 
+use std::cell::Cell;
+
 use glam::{DVec3, Vec3};
 
 use cagework_core::cage::Cage;
@@ -113,6 +115,13 @@ const VERTICES_PER_GAP: usize = 10;
 /// takes about three seconds.
 const MAX_HULL: usize = 26_000;
 
+/// The same limit if the number of voxels is given, or a lattice keeps components apart.
+const MAX_FINE_HULL: usize = 2 * MAX_HULL;
+
+/// Limit on the searches of all attempts at a cage, in visits ([`GuardedSurface::visits`]). Most models take 1 to 10
+/// million; that many take about seven seconds.
+const MAX_VISITS: u64 = 40_000_000;
+
 /// Limit on the gaps that a report names.
 const MAX_NOTICES: usize = 3;
 
@@ -140,7 +149,27 @@ pub fn generate(
     if options.smooth > 0 {
         return smooth::generate(positions, triangles, options, progress);
     }
-    generate_plain(positions, triangles, options, progress)
+    generate_plain(positions, triangles, options, &Effort::default(), progress)
+}
+
+/// Visits of the searches for a cage that are left of [`MAX_VISITS`].
+struct Effort(Cell<u64>);
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self(Cell::new(MAX_VISITS))
+    }
+}
+
+impl Effort {
+    /// Limit on the visits of the next attempt: half of what is left, because coarser lattices may follow.
+    fn next_limit(&self) -> u64 {
+        self.0.get() / 2
+    }
+
+    fn spend(&self, visits: u64) {
+        self.0.set(self.0.get().saturating_sub(visits));
+    }
 }
 
 /// Generates a cage that encloses the model without subdivision.
@@ -148,6 +177,7 @@ fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,
+    effort: &Effort,
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
     let bounds = options::check(positions, triangles, options)?;
@@ -185,7 +215,8 @@ fn generate_plain(
             let of = (mirrors, narrow.handles);
             let shell =
                 |n| Shell::new(positions, triangles, bounds, (n, narrow.stretch), of, options, &go_on);
-            Components::find(|n| Ok(shell(n)?.separate), [base, affordable], target)?
+            let parts = |n| shell(n).map(|shell| (shell.separate, shell.hull.positions.len()));
+            Components::find(parts, [base, affordable], target)?
         }
         _ => Components::ONE,
     };
@@ -210,7 +241,7 @@ fn generate_plain(
         starts.push(Start { mirrors: Mirrors::NONE, ..first });
     }
     starts.iter_mut().for_each(|start| start.voxels = start.voxels.max(components.voxels));
-    let model = Model { soup, bounds, base, most_gaps, least: components.voxels, narrow };
+    let model = Model { soup, bounds, base, most_gaps, least: components.voxels, narrow, effort };
     let mut best: Option<(Flaws, Attempt)> = None;
     let mut attempts = 0;
     for k in 0..starts.len() {
@@ -304,6 +335,7 @@ struct Model<'a> {
     /// Limit on the gaps that a cage keeps open.
     most_gaps: usize,
     narrow: NarrowGaps,
+    effort: &'a Effort,
 }
 
 /// A verified cage, and how it was made.
@@ -393,13 +425,14 @@ impl Model<'_> {
             let may_coarsen = attempt < MAX_LATTICES && voxels > least;
             let may_shrink = attempt < n_lattices && may_coarsen;
             let n_half = shell.hull.positions.len();
-            if options.voxels == 0 && voxels > base && may_shrink && n_half > MAX_HULL {
-                let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
+            let max_hull = if options.voxels == 0 { MAX_HULL } else { MAX_FINE_HULL };
+            if voxels > base && may_shrink && n_half > max_hull {
+                let shrunk = voxels as f64 * (0.9 * max_hull as f64 / n_half as f64).sqrt();
                 voxels = (shrunk as usize).max(base).max(least);
                 continue;
             }
             let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
-            let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify) {
+            let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, self.effort, &simplify) {
                 Ok(Simplification::Cage(cage, hull)) => (*cage, hull),
                 Ok(Simplification::TooMany(_)) if mirrors.len() > 1 => {
                     mirrors = mirrors.first();
@@ -418,7 +451,7 @@ impl Model<'_> {
             if mirrors.len() > 1 && cage.n_vertices() > MIN_TARGET as usize {
                 // Crossings of several mirror planes may cost vertices, and these may be missing for gaps.
                 let of_one = shell_of(mirrors.first())?;
-                let other = simplify_hull(&of_one, options, may_coarsen, &simplify);
+                let other = simplify_hull(&of_one, options, may_coarsen, self.effort, &simplify);
                 if let Err(CageGenError::Cancelled(cancelled)) = other {
                     return Err(cancelled.into());
                 }
@@ -462,6 +495,7 @@ fn simplify_hull(
     shell: &Shell,
     options: &CageOptions,
     may_coarsen: bool,
+    effort: &Effort,
     go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<Simplification, CageGenError> {
     let n_hull = shell.hull.n_whole();
@@ -473,6 +507,7 @@ fn simplify_hull(
         let spacings = shell.spacings();
         let has_plates = spacings.iter().flatten().any(|spacing| spacing.along.is_none());
         let mut collapser = Collapser::new(&mut guarded, spacings);
+        collapser.max_visits = effort.next_limit();
         let mut left = n_hull;
         // The first passes collapse edges within the allowed distance, in narrow bands. Later passes ignore this
         // distance and collapse edges down to the target, in any band.
@@ -509,7 +544,10 @@ fn simplify_hull(
             left = collapser.run(aim, &|share| go_on(from + 0.6 * share / n_passes))?;
         }
         collapser.surface.may_fold = false;
-        if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
+        effort.spend(collapser.surface.visits());
+        if collapser.is_exhausted()
+            || may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target)
+        {
             return Ok(Simplification::TooMany(left));
         }
         // Convert to voxels of the lattice of `first_voxels`, so that relaxation weighs distance against shape in the

@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::Effort;
 use super::options::{self, CageGenError, CageOptions, GeneratedCage};
 use crate::check::grow;
 use cagework_core::cage::Cage;
@@ -29,13 +30,18 @@ pub(super) fn generate(
         [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
     });
     let points: Vec<Vec3> = positions.iter().copied().chain(middles).collect();
-    let began = progress.now_ms();
+    let (began, effort) = (progress.now_ms(), Effort::default());
     for (attempt, room) in
         (1u32..).zip(CLEARANCES.into_iter().filter(|&room| room == 0.0 || room > options.clearance))
     {
         let clearance = room.max(options.clearance);
-        let mut made =
-            super::generate_plain(positions, triangles, &CageOptions { clearance, ..*options }, progress)?;
+        let mut made = super::generate_plain(
+            positions,
+            triangles,
+            &CageOptions { clearance, ..*options },
+            &effort,
+            progress,
+        )?;
         let mut mesh = made.cage.to_polygon_mesh();
         // Growing would break the symmetry of a mirrored cage.
         if made.report.mirror.is_none() && grow(&mut mesh, &points, options.smooth).is_err() {

@@ -1,11 +1,12 @@
+use std::cell::Cell;
 use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec2, Vec3, vec3};
 use proptest::prelude::*;
 
 use super::{
-    CageGenError, CageKind, CageOptions, CageReport, GeneratedCage, Lattice, MAX_ROWS, Mirror, Symmetry,
-    generate,
+    CageGenError, CageKind, CageOptions, CageReport, Effort, GeneratedCage, Lattice, MAX_FINE_HULL, MAX_ROWS,
+    MAX_VISITS, Mirror, Mirrors, Shell, Simplification, Symmetry, check_input, generate, simplify_hull,
 };
 use cagework_core::bind::bind;
 use cagework_core::cage::{Cage, subdivided_box};
@@ -460,6 +461,47 @@ fn a_coarse_lattice_joins_no_components_unless_the_cage_has_too_few_vertices() {
     assert!(many.parts < 25, "{}", many.parts);
     let remedy = "for 25 components of the model; for a part each, allow more than 80 vertices";
     assert!(many.notices[0].ends_with(remedy), "{:?}", many.notices);
+}
+
+/// Two frames of bars, each in the gaps of the other, are kept apart only by lattices on which their hulls have some
+/// hundred thousand vertices.
+#[test]
+fn components_that_only_a_fine_lattice_keeps_apart_get_one_part() {
+    let bars = (0..3 * 36 * 2).map(|k| {
+        let [axis, at, frame] = [k % 3, k / 3 % 36, k / 108];
+        let mut low = [at as f32 % 6.0, (at / 6) as f32, 0.0];
+        let mut high = [low[0], low[1], 5.0];
+        low.rotate_right(axis);
+        high.rotate_right(axis);
+        let [low, high] = [low, high].map(|p| Vec3::from_array(p) + 0.5 * frame as f32);
+        tube(&segment(low, high), 0.02, false)
+    });
+    let each = CageOptions { per_component: true, ..options(20) };
+    let made = make(&join(bars), &each).report;
+    assert!(made.hull_vertices < MAX_FINE_HULL as u32, "{}", made.hull_vertices);
+    let sentence = "the cage has 1 closed part for 2 components of the model; for a part each, make their cages from \
+                    files of their own: a lattice that keeps them apart would be too fine";
+    assert_eq!(made.notices[0], sentence);
+}
+
+/// With a limit on the searches, the hull is not simplified, and a coarser lattice follows.
+#[test]
+fn collapsing_ends_when_the_searches_take_too_long() {
+    let soup = tube(&segment(Vec3::ZERO, Vec3::X), 0.2, false);
+    let options = options(20);
+    let bounds = check_input(&soup.0, &soup.1, &options).unwrap();
+    let of = (Mirrors::NONE, usize::MAX);
+    let shell = Shell::new(&soup.0, &soup.1, bounds, (36, DVec3::ONE), of, &options, &|_| Ok(())).unwrap();
+    let simplified = |visits| {
+        let effort = Effort(Cell::new(visits));
+        let made = simplify_hull(&shell, &options, true, &effort, &|_| Ok(())).unwrap();
+        (matches!(made, Simplification::TooMany(_)), effort.0.get())
+    };
+    let (is_too_much, left) = simplified(MAX_VISITS);
+    assert!(!is_too_much && left < MAX_VISITS);
+    let needed = MAX_VISITS - left;
+    assert_eq!(simplified(needed), (true, simplified(needed).1));
+    assert!(simplified(needed).1 > 0, "half of the visits are left for coarser lattices");
 }
 
 #[test]

@@ -63,6 +63,10 @@ const FIRST_REMEDY: usize = 4;
 /// Largest number of attempts.
 const MAX_ATTEMPTS: usize = 11;
 
+/// Limit on the points that rings are fitted to, counted in each attempt. Figures take about 4,000 in an attempt. A soup
+/// of that many takes about six seconds.
+const MAX_FITTED: usize = 45_000;
+
 /// Number of pairs of quads that meet after the fit of rings, above which the fit of vertices is left out: it does not
 /// separate them. The first attempts for a rig have it in any case.
 const MAX_CROSSINGS: usize = 6;
@@ -116,11 +120,13 @@ pub enum Refusal {
     },
     /// The faces are so large together that checking them takes too long.
     #[error(
-        "the model's faces overlap too much for sleeves: they take {samples} samples, and at most {MAX_SAMPLES} are allowed; use the kind shell"
+        "the model's faces overlap too much for sleeves: they take {samples} samples, and at most {limit} are allowed; use the kind shell"
     )]
     TooManySamples {
         /// Number of samples of the model's surface.
         samples: usize,
+        /// Largest number.
+        limit: usize,
     },
     /// Limbs touch or overlap.
     #[error(
@@ -257,7 +263,7 @@ pub fn generate(
     let model = Model { at, triangles: triangles.to_vec() };
     let n = n_samples(&model, SPACING);
     if n > MAX_SAMPLES {
-        return Err(Refusal::TooManySamples { samples: n }.into());
+        return Err(Refusal::TooManySamples { samples: n, limit: MAX_SAMPLES }.into());
     }
     let sampled = |spacing| samples(&model, spacing, &skeleton.chain_of, &skeleton.bone_of);
     let mut unmirrored = sampled(SPACING);
@@ -275,7 +281,7 @@ pub fn generate(
     let mut remedies = Remedies::default();
     // Encloses only the samples to which sleeves are fitted. Used if the next attempt does not enclose all points.
     let mut enclosing = None;
-    let mut next = 0;
+    let (mut next, mut n_fitted) = (0, 0);
     for attempt in 0..MAX_ATTEMPTS {
         let Some((share, clearance, may_straighten)) = ATTEMPTS.get(next).copied() else { break };
         let go_on = |done: f32| {
@@ -317,6 +323,12 @@ pub fn generate(
             }
         };
         let thin = thinned(&plan.samples);
+        n_fitted += thin.len();
+        if n_fitted > MAX_FITTED {
+            let samples = n_fitted;
+            return enclosing
+                .ok_or(refusal.unwrap_or(Refusal::TooManySamples { samples, limit: MAX_FITTED }).into());
+        }
         let mut fit = Fit::new(&plan, base, &thin);
         fit.fit_rings(&|done| go_on(RING_SHARE * done))?;
         let is_tangled = fit.n_crossings() > MAX_CROSSINGS;

@@ -217,8 +217,21 @@ fn refusals_say_what_to_do() {
     let all = 0..soup.positions.len() as u32;
     let [low, high] = [all.clone().min_by(order).unwrap(), all.max_by(order).unwrap()];
     soup.triangles = vec![[low, high, low + 1]; 10_000];
-    let Refusal::TooManySamples { samples } = refusal(&soup, 80) else { panic!("they are too many") };
+    let Refusal::TooManySamples { samples, limit: MAX_SAMPLES } = refusal(&soup, 80) else {
+        panic!("they are too many")
+    };
     assert!(samples > MAX_SAMPLES);
+    // 60,000 copies of a vertex, each moved by up to 2: the points of one attempt are already too many.
+    let mut cloud = figure(0.16);
+    let (n, at) = (cloud.positions.len(), cloud.positions.clone());
+    for k in 0..60_000_u32 {
+        let [x, y, z] = [k % 40, k / 40 % 40, k / 1600].map(|x| x as f32 / 40.0 - 0.5);
+        cloud.positions.push(at[k as usize % n] + 4.0 * Vec3::new(x, y, z));
+        cloud.skeleton.chain_of.push(cloud.skeleton.chain_of[k as usize % n]);
+        cloud.skeleton.bone_of.push(cloud.skeleton.bone_of[k as usize % n]);
+    }
+    let why = refusal(&cloud, 80);
+    assert!(matches!(why, Refusal::TooManySamples { limit: MAX_FITTED, .. }), "{why}");
 }
 
 /// Legs of radius 0.1 whose axes are 0.12 apart overlap.
