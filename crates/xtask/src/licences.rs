@@ -58,12 +58,12 @@ fn of_bundle(folder: &Path) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// Writes the notices of the `cagework` command into `folder`.
+/// Writes the notices of the `cagework` command for a target into `folder`.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
-pub(crate) fn of_command(folder: &Path) -> Result<(), String> {
-    write(folder, of_crates("cagework-cli", &host()?, &[])?)
+pub(crate) fn of_command(folder: &Path, target: &str) -> Result<(), String> {
+    write(folder, of_crates("cagework-cli", target, &[])?)
 }
 
 /// Writes the notices of the Python package into `folder`, which belongs to the package.
@@ -91,7 +91,11 @@ pub(crate) fn of_widget(files: &Path, folder: &Path) -> Result<(), String> {
     write(folder, [of_wasm()?, of_bundle(files)?].concat())
 }
 
-fn host() -> Result<String, String> {
+/// Target of this machine's programs.
+///
+/// # Errors
+/// When rustc does not name it.
+pub(crate) fn host() -> Result<String, String> {
     let about = output("rustc", &["-vV"])?;
     about
         .lines()

@@ -10,6 +10,7 @@ mod npm;
 mod package;
 mod parts;
 mod python;
+mod release;
 mod site;
 mod tasks;
 mod wasm;
@@ -40,6 +41,9 @@ const USAGE: &str = "usage: cargo xtask TASK
   notebooks      the notebook widget in JupyterLab, and the example notebooks (600 MB to download)
   notebook-wheel the notebook widget's wheel, into target/notebook
   wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
+  wheel-notices  the licences that the wheel contains, for other builds of it
+  archive [TARGET]  the release `cagework` with its licences, for this machine or TARGET, into target/archives
+  release-check TAG  whether versions, changelog and addresses are ready to be released as TAG
   npm            the npm package only: packed, installed into a blank project and tested there, in Node and in a browser
   npm-pack       the npm package, packed into target/npm
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/package/src/pkg
@@ -78,6 +82,10 @@ fn main() -> ExitCode {
         ["notebooks"] => python::test_notebooks(),
         ["notebook-wheel"] => python::notebook_wheel().map(|wheel| println!("{wheel}")),
         ["wheel", rest @ ..] => python::wheel(rest),
+        ["wheel-notices"] => python::write_notices(),
+        ["archive"] => release::archive(None).map(|archive| println!("{archive}")),
+        ["archive", target] => release::archive(Some(target)).map(|archive| println!("{archive}")),
+        ["release-check", tag] => release::check(tag),
         ["npm"] => package::test(),
         ["npm-pack"] => package::pack().map(drop),
         ["arrows"] => arrows::check(),

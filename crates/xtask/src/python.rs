@@ -157,18 +157,27 @@ fn blank(name: &str) -> Result<String, String> {
 /// Builds the wheel of [`PACKAGE`] into an emptied folder; returns the folder. `args` are passed to maturin.
 fn build(python: &str, args: &[&str]) -> Result<String, String> {
     let wheels = target_folder()?.join("wheels");
-    let notices = root().join(NOTICES);
     empty(&wheels)?;
-    empty(&notices)?;
-    licences::of_wheel(&notices)?;
-    our_licences(&notices)?;
+    write_notices()?;
     let (manifest, wheels) = (path(root().join(PACKAGE).join("Cargo.toml"))?, path(wheels)?);
     let fixed = ["-m", "maturin", "build", "--locked", "--manifest-path", &manifest, "--out", &wheels];
     run(python, &[&fixed[..], args].concat(), &[])?;
     Ok(wheels)
 }
 
-fn our_licences(to: &Path) -> Result<(), String> {
+/// Writes the licences of everything compiled into the wheel to [`NOTICES`], where maturin finds them.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn write_notices() -> Result<(), String> {
+    let notices = root().join(NOTICES);
+    empty(&notices)?;
+    licences::of_wheel(&notices)?;
+    our_licences(&notices)
+}
+
+/// Copies the licences of this repository to a folder.
+pub(crate) fn our_licences(to: &Path) -> Result<(), String> {
     for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
         std::fs::copy(root().join(ours), to.join(ours)).map_err(|e| format!("cannot copy {ours}: {e}"))?;
     }
@@ -176,7 +185,7 @@ fn our_licences(to: &Path) -> Result<(), String> {
 }
 
 /// Makes a folder, or removes its contents.
-fn empty(folder: &Path) -> Result<(), String> {
+pub(crate) fn empty(folder: &Path) -> Result<(), String> {
     if folder.exists() {
         std::fs::remove_dir_all(folder).map_err(|e| format!("cannot remove {}: {e}", folder.display()))?;
     }

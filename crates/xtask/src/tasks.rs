@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::command::{root, run};
 use crate::npm::{self, exec};
 use crate::parts::{self, part};
-use crate::{arrows, deny, licences, package, python, site, wasm};
+use crate::{arrows, deny, licences, package, python, release, site, wasm};
 
 /// Builds the `cagework` command in release mode and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -18,7 +18,7 @@ pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
 pub(crate) fn build() -> Result<(), String> {
     site::build()?;
     run("cargo", &["build", "--release", "--locked", "--package", "cagework-cli"], &[])?;
-    licences::of_command(&wasm::target_folder()?.join("release"))
+    licences::of_command(&wasm::target_folder()?.join("release"), &licences::host()?)
 }
 
 /// Arguments of Cargo that select the packages of all test builds. They are always the same, so that builds share
@@ -175,24 +175,12 @@ fn check_rust() -> Result<(), String> {
 fn check_files() -> Result<(), String> {
     arrows::check()?;
     deny::check()?;
-    one_version()?;
+    release::check_manifests()?;
     // Packs every crate that does not say `publish = false`. Fails if one lacks metadata or files, or depends on a
     // crate that is not published. Building the packages is left to the same command before a release.
     let package =
         ["publish", "--workspace", "--dry-run", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
     run("cargo", &package, &[])
-}
-
-/// Checks that the npm packages have the version of the workspace.
-fn one_version() -> Result<(), String> {
-    let own = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
-    for path in ["package.json", "web/package/package.json"] {
-        let text = std::fs::read_to_string(root().join(path)).map_err(|e| format!("{path}: {e}"))?;
-        if !text.contains(own) {
-            return Err(format!("{path} must say {own}, as Cargo.toml does"));
-        }
-    }
-    Ok(())
 }
 
 /// Checks that exported GLBs pass the Khronos glTF validator and play in three.js as in Cagework, and that three.js
