@@ -51,7 +51,7 @@ pub(crate) use transfer::TransferArgs;
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
-    /// Print the result as JSON on stdout, and no text.
+    /// Print the result as JSON on stdout, an error as JSON on stderr, and no text.
     #[arg(long, global = true)]
     pub(crate) json: bool,
 }
@@ -84,6 +84,16 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Bind and deform the built-in sample.
     Demo(DemoArgs),
+    /// Write completions for shells, and manual pages.
+    #[command(hide = true)]
+    ShellFiles(ShellFilesArgs),
+}
+
+/// Arguments of `cagework shell-files`.
+#[derive(Args, Debug)]
+pub(crate) struct ShellFilesArgs {
+    /// Folder to write to.
+    pub(crate) folder: PathBuf,
 }
 
 /// Arguments of `cagework info`.

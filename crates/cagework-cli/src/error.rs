@@ -142,9 +142,14 @@ impl CliError {
     }
 }
 
-/// Prints an error and its hint on stderr.
-pub(crate) fn print_error(message: &str, hint: Option<&str>) {
-    let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
+/// Prints an error and its hint on stderr. As JSON, it is one line: an object with `error` and `hint`, which may be null.
+pub(crate) fn print_error(message: &str, hint: Option<&str>, as_json: bool) {
+    let text = if as_json {
+        format!("{}\n", serde_json::json!({ "error": message, "hint": hint }))
+    } else {
+        let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
+        format!("error: {message}\n{hint}")
+    };
     // Ignore failures: if stderr is closed, the error cannot be reported.
-    let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
+    let _ = std::io::stderr().write_all(text.as_bytes());
 }

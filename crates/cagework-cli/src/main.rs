@@ -1,6 +1,6 @@
 //! The `cagework` command: binds a mesh to a cage by harmonic coordinates, deforms it, and reports the accuracy.
 //!
-//! Results go to stdout (as JSON with `--json`), errors to stderr. Exit codes: 0 success, 1 error, 2 invalid command
+//! Results go to stdout and errors to stderr, as JSON with `--json`. Exit codes: 0 success, 1 error, 2 invalid command
 //! line.
 
 mod args;
@@ -24,6 +24,7 @@ mod proportions;
 mod pull;
 mod refit;
 mod render;
+mod shell_files;
 mod signals;
 mod transfer;
 
@@ -55,11 +56,12 @@ fn main() -> ExitCode {
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
         Command::Demo(args) => demo::run(args, cli.json),
+        Command::ShellFiles(args) => shell_files::run(args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            error::print_error(&error.message(), error.hint());
+            error::print_error(&error.message(), error.hint(), cli.json);
             ExitCode::FAILURE
         }
     }

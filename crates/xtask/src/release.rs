@@ -83,7 +83,10 @@ pub(crate) fn check(tag: &str) -> Result<(), String> {
 /// Whether a text has the form of 2026-11-30.
 fn is_date(text: &str) -> bool {
     text.len() == 10
-        && text.bytes().enumerate().all(|(k, b)| if k == 4 || k == 7 { b == b'-' } else { b.is_ascii_digit() })
+        && text
+            .bytes()
+            .enumerate()
+            .all(|(k, b)| if k == 4 || k == 7 { b == b'-' } else { b.is_ascii_digit() })
 }
 
 /// Builds the release `cagework` for a target, by default this machine, and packs it with its licences into
@@ -106,6 +109,11 @@ pub(crate) fn archive(target: Option<&str>) -> Result<String, String> {
     empty(&folder)?;
     licences::of_command(&folder, name)?;
     our_licences(&folder)?;
+    // A program for another processor cannot write these here, and they are the same for all.
+    let packed_folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
+    let shell_files =
+        ["run", "--quiet", "--release", "--locked", "--package", "cagework-cli", "--", "shell-files"];
+    run("cargo", &[&shell_files[..], &[packed_folder]].concat(), &[])?;
     for (from, to) in [(built, program), (root().join("docs/cli.md"), "cli.md")] {
         fs::copy(&from, folder.join(to)).map_err(|e| format!("cannot copy {}: {e}", from.display()))?;
     }

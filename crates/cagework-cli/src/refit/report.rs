@@ -78,7 +78,7 @@ pub(super) fn print_entry(entry: &ModelEntry, as_json: bool) -> Result<(), CliEr
     let output = shown_path(entry.output.as_ref());
     match &entry.outcome {
         Outcome::Failed { error, hint } => {
-            print_error(error, *hint);
+            print_error(error, *hint, as_json);
             Ok(())
         }
         _ if as_json => Ok(()),

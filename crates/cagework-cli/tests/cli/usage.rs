@@ -15,6 +15,30 @@ fn version_and_help_succeed() {
     }
 }
 
+#[test]
+fn errors_are_json_objects_on_request() {
+    let sandbox = Sandbox::new();
+    let ran = sandbox.run("info nothing.glb --json").code(1).stdout("");
+    let error: serde_json::Value = serde_json::from_slice(&ran.get_output().stderr).unwrap();
+    assert!(error["error"].as_str().unwrap().contains("nothing.glb"), "{error}");
+    assert!(error["hint"].is_null(), "{error}");
+}
+
+/// bash accepts the completions, and each command has a page.
+#[test]
+fn completions_and_manual_pages_are_written() {
+    let sandbox = Sandbox::new();
+    sandbox.run("shell-files out").success();
+    let out = sandbox.path("out");
+    let bash = std::fs::read_to_string(out.join("completions/cagework.bash")).unwrap();
+    assert!(bash.contains("--outside") && bash.contains("proportions"));
+    for name in ["completions/_cagework", "completions/cagework.fish", "completions/_cagework.ps1"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    let page = std::fs::read_to_string(out.join("man/cagework-deform.1")).unwrap();
+    assert!(page.starts_with(".") && page.contains("cage"), "{page}");
+}
+
 /// Commands that need faces do not list the formats that only have splats.
 #[test]
 fn help_lists_the_formats_that_a_command_takes() {
