@@ -55,7 +55,8 @@ fn mismatch(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> Py
     error::array(format!("{name}: expected {expected}, got {dtype} of shape {shape:?}"))
 }
 
-/// Reads points `[n, 3]` relative to an origin. If `n` is given, the number of points must match.
+/// Reads points `[n, 3]` relative to an origin. Whole numbers are converted. If `n` is given, the number of points must
+/// match.
 ///
 /// # Errors
 /// `ArrayError`, with the actual and the expected type and shape.
@@ -65,7 +66,10 @@ pub(crate) fn points<'py>(
     n: Option<usize>,
     origin: DVec3,
 ) -> PyResult<Points<'py>> {
-    let array = c_contiguous(name, value)?;
+    let mut array = c_contiguous(name, value)?;
+    if matches!(array.dtype().kind(), b'i' | b'u') {
+        array = array.call_method1("astype", ("float64",))?.cast_into()?;
+    }
     let fits = matches!(*array.shape(), [rows, 3] if n.is_none_or(|n| n == rows));
     match (fits, array.cast::<PyArray2<f32>>(), array.cast::<PyArray2<f64>>()) {
         (true, Ok(array), _) if origin == DVec3::ZERO => Ok(Points::Borrowed(array.try_readonly()?)),

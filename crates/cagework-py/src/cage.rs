@@ -1,5 +1,6 @@
 //! The class `Cage`, `generate_cage` and `check_cage`.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 
 use cagework_cage::check::check_smooth;
@@ -191,6 +192,22 @@ impl Cage {
     fn __repr__(&self) -> String {
         let cage = self.set.cage();
         format!("Cage({} vertices, {} faces)", cage.n_vertices(), cage.faces().len())
+    }
+
+    /// Whether the cages have the same vertices, faces and steps of subdivision.
+    fn __eq__(&self, other: &Self) -> bool {
+        let [a, b] = [self, other].map(|cage| cage.set.cage());
+        (self.origin, self.smooth()) == (other.origin, other.smooth())
+            && a.positions() == b.positions()
+            && a.faces() == b.faces()
+    }
+
+    fn __hash__(&self) -> u64 {
+        let cage = self.set.cage();
+        let mut hasher = DefaultHasher::new();
+        cage.faces().hash(&mut hasher);
+        bytemuck::cast_slice::<_, u8>(cage.positions()).hash(&mut hasher);
+        hasher.finish()
     }
 
     /// Arguments that pickle passes to the constructor.

@@ -138,6 +138,11 @@ impl Field {
     fn save(&self, path: PathBuf) -> PyResult<()> {
         files::write(&path, &write_field_npz(&self.field, self.cage.get().origin(), UpAxis::Y))
     }
+
+    fn __repr__(&self) -> String {
+        let [x, y, z] = self.field.lattice.dims.to_array().map(|n| n - 1);
+        format!("Field({x} x {y} x {z} cells)")
+    }
 }
 
 impl Field {

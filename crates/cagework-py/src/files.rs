@@ -8,7 +8,7 @@ use cagework_core::rig::Rig;
 use cagework_io::{Clip, Model, ModelFormat, Resolve, shown};
 use glam::DVec3;
 use numpy::PyArray2;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOSError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList, PyMemoryView};
 
@@ -87,8 +87,14 @@ fn beside(main: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     }))
 }
 
-/// Creates the Python exception for an I/O error, such as `FileNotFoundError`; its message contains the file's name.
+/// Creates the Python exception for an I/O error, such as `FileNotFoundError`, with `errno` and `filename` for an error of
+/// the operating system. Its message contains the file's name.
 fn named(path: &Path, error: &io::Error) -> PyErr {
+    if let Some(number) = error.raw_os_error() {
+        let text = error.to_string();
+        let text = text.split(" (os error").next().unwrap_or_default().to_owned();
+        return PyOSError::new_err((number, text, path.to_string_lossy().into_owned()));
+    }
     io::Error::new(error.kind(), format!("{}: {error}", shown(&path.to_string_lossy()))).into()
 }
 
@@ -186,10 +192,10 @@ pub(crate) fn read_model<'py>(
     Ok((arrays::array_of(py, positions, origin)?, arrays::triples(py, &triangles)?))
 }
 
-/// Returns the GLB of an unmoved model in a glTF or FBX file, which needs no other files. `None` for other formats. A GLB
-/// without other files is returned as it is.
+/// Returns the mesh of a glTF or FBX file, with its materials, as a GLB that needs no other files. `None` for other
+/// formats. The vertices are those of `read_model`.
 ///
-/// For `cagework_notebook`, which sends a single file to the notebook. The vertices are those of `read_model`.
+/// For `cagework_notebook`, which sends a single file to the notebook.
 ///
 /// Raises `OSError`, `ModelError`.
 #[pyfunction]

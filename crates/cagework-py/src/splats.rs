@@ -41,6 +41,10 @@ impl Splats {
         self.splats.len()
     }
 
+    fn __repr__(&self) -> String {
+        format!("Splats({} splats, spherical harmonics of degree {})", self.splats.len(), self.splats.degree)
+    }
+
     /// Centres, [n, 3], object units.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

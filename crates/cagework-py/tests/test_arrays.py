@@ -13,12 +13,19 @@ POINTS = np.zeros((5, 3))
 N_POINTS = 200_000
 
 
+def test_whole_numbers_are_converted():
+    points = np.array([[1, 0, 0], [0, -1, 2]], "i4")
+    np.testing.assert_array_equal(
+        cw.Field(CUBE, 2 * CUBE.vertices, cells=8).map(points), cw.Field(CUBE, 2 * CUBE.vertices, cells=8).map(points * 1.0)
+    )
+
+
 @pytest.mark.parametrize(
     ("call", "actual", "expected"),
     [
         (lambda: cw.bind(np.zeros((5, 2)), CUBE), "float64 of shape [5, 2]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind(np.zeros(3, "f4"), CUBE), "float32 of shape [3]", "float32 or float64 of shape [n, 3]"),
-        (lambda: cw.bind(np.zeros((5, 3), int), CUBE), "int64 of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.bind(np.zeros((5, 3), bool), CUBE), "bool of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind([["a", "b", "c"]], CUBE), "<U1 of shape [1, 3]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.generate_cage(POINTS, POINTS), "float64 of shape [5, 3]", "integers of shape [n, 3]"),
         (lambda: cw.generate_cage(POINTS, [[0, 1, 2, 3]]), "int64 of shape [1, 4]", "integers of shape [n, 3]"),

@@ -127,6 +127,8 @@ def _read(model: Any) -> tuple[str, bytes, np.ndarray | None]:
     if isinstance(model, (bytes, str, PathLike)):
         # The format of bytes is recognised by the first of them.
         name, data = ("model", model) if isinstance(model, bytes) else (Path(model).name, Path(model).read_bytes())
+        if data[:4] == b"glTF":
+            return f"{Path(name).stem}.glb", data, None
         glb = to_glb(model)
         return (name, data, None) if glb is None else (f"{Path(name).stem}.glb", glb, None)
     vertices, triangles = (model.vertices, model.faces) if hasattr(model, "vertices") else model
