@@ -134,6 +134,22 @@ mod tests {
         }
     }
 
+    /// Lines along z through these points pass edges of the cage.
+    #[test]
+    fn points_above_edges_are_counted() {
+        let cage = box_cage();
+        let triangles: Vec<_> =
+            (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)).collect();
+        let columns = Columns::new(&triangles);
+        for p in
+            cage.positions().iter().flat_map(|p| [-0.4, 0.4].map(|z| DVec3::new(p.x.into(), p.y.into(), z)))
+        {
+            let is_inside = p.truncate().abs().max_element() < 1.0;
+            let is_on = !is_inside && p.truncate().abs().max_element() <= 1.0;
+            assert_eq!(columns.counted(p), (!is_on).then_some(1.0), "{p}");
+        }
+    }
+
     /// A bind follows points on the cage exactly, so they are inside, whatever rounding makes of their winding number.
     #[test]
     fn points_on_the_cage_are_inside() {

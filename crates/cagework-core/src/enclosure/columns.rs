@@ -1,4 +1,4 @@
-//! Winding numbers of many points by counting crossings of a vertical ray (along z) with the surface.
+//! Winding numbers of many points by counting crossings of a ray, almost along z, with the surface.
 //!
 //! The winding number is the number of crossings at which the ray leaves the closed surface minus those at which it
 //! enters. Faces are sorted into columns, so that each ray is tested against few of them. If rounding could matter,
@@ -17,11 +17,20 @@ const TOLERANCE: f64 = 1e-9;
 /// Largest number of columns along x and along y. A table of this size fits in the processor's cache.
 const MAX_COLUMNS: f64 = 64.0;
 
-/// Faces of a closed surface, sorted into columns along z.
+/// Slope of the rays in x and y. Rays along z would pass edges of the surface for all points in a mirror plane of a
+/// symmetric model, or between vertices at the same x or y.
+const SLOPE: DVec2 = DVec2::new(0.011_803_7, 0.027_917_3);
+
+/// Coordinates in which the rays are vertical. The map keeps orientations, hence winding numbers.
+fn sheared(p: DVec3) -> DVec3 {
+    (p.truncate() - p.z * SLOPE).extend(p.z)
+}
+
+/// Faces of a closed surface, sorted into columns along the rays.
 #[derive(Clone, Debug)]
 pub struct Columns<'a> {
     triangles: Cow<'a, [[DVec3; 3]]>,
-    /// Corner of the first column in x and y, object units.
+    /// Corner of the first column in x and y, object units, in the coordinates of the rays.
     low: DVec2,
     /// Number of columns per object unit along x and y.
     per_unit: DVec2,
@@ -36,7 +45,7 @@ impl<'a> Columns<'a> {
     #[must_use]
     pub fn new(triangles: impl Into<Cow<'a, [[DVec3; 3]]>>) -> Self {
         let triangles = triangles.into();
-        let corners = || triangles.iter().flatten().map(|p| p.truncate());
+        let corners = || triangles.iter().flatten().map(|&p| sheared(p).truncate());
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
         let high = corners().fold(DVec2::NEG_INFINITY, DVec2::max);
         let all = || triangles.iter().flatten();
@@ -50,7 +59,7 @@ impl<'a> Columns<'a> {
         let mut columns = Self { triangles, low, per_unit, side, extent, over };
         for number in 0..columns.triangles.len() as u32 {
             let triangle = columns.triangles[number as usize];
-            let corners = triangle.map(DVec3::truncate);
+            let corners = triangle.map(|q| sheared(q).truncate());
             let near = DVec2::splat(TOLERANCE * extent);
             let [first, last] = [
                 columns.column(corners[0].min(corners[1]).min(corners[2]) - near),
@@ -80,12 +89,12 @@ impl<'a> Columns<'a> {
 
     /// Counts the crossings above a point; `None` if rounding could matter.
     pub(super) fn counted(&self, point: DVec3) -> Option<f64> {
-        let p = point.truncate();
+        let p = sheared(point).truncate();
         let [x, y] = self.column(p);
         let mut leaves = 0;
         for &number in &self.over[y * self.side + x] {
             let corners = self.triangles[number as usize];
-            let [a, b, c] = corners.map(|q| q.truncate() - p);
+            let [a, b, c] = corners.map(|q| sheared(q).truncate() - p);
             // Twice the signed areas of the triangles that the point forms with the sides.
             let areas = [b.perp_dot(c), c.perp_dot(a), a.perp_dot(b)];
             let near = TOLERANCE * self.extent * self.extent;
