@@ -11,7 +11,7 @@ const MAX_WASM_BYTES: usize = 2_140_000;
 /// The same limit for the wasm file of browsers without WebGPU, which also contains a translator of shaders.
 const MAX_WEBGL_BYTES: usize = 2_795_000;
 /// The same limit for the converter of FBX files, which visitors download with the first such file.
-const MAX_FBX_BYTES: usize = 213_000;
+const MAX_FBX_BYTES: usize = 199_000;
 /// Limit on the script of the page, gzip-compressed bytes.
 const MAX_SCRIPT_BYTES: usize = 106_000;
 

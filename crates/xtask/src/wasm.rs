@@ -66,11 +66,16 @@ const ARTIFACTS: [Artifact; 3] = [
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// Compiler, archiver and flags for the C code of `ufbx`, as its build script expects them. Its calls of the C library
-/// become calls of functions in `cagework-fbx`.
+/// become calls of functions in `cagework-fbx`. Features that this crate does not use, such as subdivision and OBJ files,
+/// are left out.
 const C_COMPILER: [(&str, &str); 3] = [
     ("CC_wasm32_unknown_unknown", "clang"),
     ("AR_wasm32_unknown_unknown", "ar"),
-    ("CFLAGS_wasm32_unknown_unknown", "-DUFBX_NO_LIBC -DUFBX_NO_STDIO -Oz"),
+    (
+        "CFLAGS_wasm32_unknown_unknown",
+        "-DUFBX_NO_LIBC -DUFBX_NO_STDIO -DUFBX_MINIMAL -DUFBX_ENABLE_ANIMATION_BAKING -DUFBX_ENABLE_SCENE_EVALUATION \
+         -DUFBX_ENABLE_TRIANGULATION -DUFBX_ENABLE_INDEX_GENERATION -Oz",
+    ),
 ];
 
 /// Files and folders that the packages are built from.
