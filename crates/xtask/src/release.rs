@@ -11,14 +11,17 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 const HOMEPAGE: &str = env!("CARGO_PKG_HOMEPAGE");
 
-/// Texts that the manifests outside the Cargo workspace contain: the version and the addresses of `Cargo.toml`.
-fn expected() -> [(&'static str, Vec<String>); 7] {
+/// Texts that files outside the Cargo workspace contain: the version and the addresses of `Cargo.toml`.
+fn expected() -> [(&'static str, Vec<String>); 9] {
     let quoted = |key: &str| format!("{key} = \"{VERSION}\"");
     let json = format!("\"version\": \"{VERSION}\"");
+    let link = vec![format!("{REPOSITORY}/blob/main/docs/")];
     let urls = [REPOSITORY, HOMEPAGE].map(|url| format!("\"{url}\""));
     [
         ("package.json", vec![json.clone()]),
         ("web/package/package.json", vec![json, format!("\"git+{REPOSITORY}.git\""), urls[1].clone()]),
+        ("web/package/README.md", link.clone()),
+        ("crates/cagework-py/README.md", link),
         ("crates/cagework-py/pyproject.toml", urls.to_vec()),
         (
             "crates/cagework-py/notebook/pyproject.toml",
@@ -37,10 +40,10 @@ fn expected() -> [(&'static str, Vec<String>); 7] {
     ]
 }
 
-/// Checks that all manifests have the version and the addresses of `Cargo.toml`.
+/// Checks that manifests, citation and packed READMEs have the version and the addresses of `Cargo.toml`.
 ///
 /// # Errors
-/// Names the first manifest that differs.
+/// Names the first file that differs.
 pub(crate) fn check_manifests() -> Result<(), String> {
     for (path, texts) in expected() {
         let manifest = read(path)?;

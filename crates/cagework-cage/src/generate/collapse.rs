@@ -141,8 +141,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
     }
 
-    /// Collapses edges until `target` vertices are left, no edge can be collapsed or the searches
-    /// reach [`Self::max_visits`]. Returns the number of vertices.
+    /// Collapses edges until `target` vertices are left, no edge can be collapsed, or the searches reach
+    /// [`Self::max_visits`]. Returns the number of vertices.
     ///
     /// # Errors
     /// If `go_on`, called with the completed share, cancels.
@@ -188,13 +188,13 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Ok(self.count)
     }
 
-    /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. The vertex on more
-    /// mirror planes remains.
     /// Whether the searches have reached [`Self::max_visits`].
     pub(super) fn is_exhausted(&self) -> bool {
         self.surface.visits() >= self.max_visits
     }
 
+    /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. The vertex on more
+    /// mirror planes remains.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         let n_planes = |v: u32| self.surface.on_mirror[v as usize].len();
         if n_planes(b) >= n_planes(a) && n_planes(b) > 0 { (b, a) } else { (a, b) }

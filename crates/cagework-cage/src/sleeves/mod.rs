@@ -63,8 +63,8 @@ const FIRST_REMEDY: usize = 4;
 /// Largest number of attempts.
 const MAX_ATTEMPTS: usize = 11;
 
-/// Limit on the points that rings are fitted to, counted in each attempt. Figures take about 4,000 in an attempt. A soup
-/// of that many takes about six seconds.
+/// Limit on the sum, over all attempts, of the number of points that rings are fitted to. Figures have about 4,000 points.
+/// Fitting 45,000 points of a soup takes about six seconds.
 const MAX_FITTED: usize = 45_000;
 
 /// Number of pairs of quads that meet after the fit of rings, above which the fit of vertices is left out: it does not
@@ -123,9 +123,9 @@ pub enum Refusal {
         "the model's faces overlap too much for sleeves: they take {samples} samples, and at most {limit} are allowed; use the kind shell"
     )]
     TooManySamples {
-        /// Number of samples of the model's surface.
+        /// Number of samples of the model's surface, or of those fitted in all attempts.
         samples: usize,
-        /// Largest number.
+        /// Largest number allowed.
         limit: usize,
     },
     /// Limbs touch or overlap.

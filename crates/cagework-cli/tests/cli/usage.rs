@@ -24,7 +24,6 @@ fn errors_are_json_objects_on_request() {
     assert!(error["hint"].is_null(), "{error}");
 }
 
-/// bash accepts the completions, and each command has a page.
 #[test]
 fn completions_and_manual_pages_are_written() {
     let sandbox = Sandbox::new();
