@@ -347,7 +347,8 @@ export async function drawn(page: Page): Promise<void> {
 
 /**
  * Takes a screenshot of the canvas alone, to be compared with another one. Toasts and other elements above the canvas
- * are hidden, because they change by themselves, and so is the focus ring, whose colours vary by rounding.
+ * are hidden, because they change by themselves, and so is the focus ring, whose colours vary by rounding. One pixel is
+ * cut off at each side: there Chromium blends the canvas with what is around it, and the rounding varies.
  */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
@@ -365,7 +366,7 @@ export async function drawing(page: Page): Promise<Buffer> {
     document.adoptedStyleSheets.push(sheet);
     return sheet;
   });
-  const picture = await page.screenshot({ clip: { x, y, width, height } });
+  const picture = await page.screenshot({ clip: { x: x + 1, y: y + 1, width: width - 2, height: height - 2 } });
   await sheet.evaluate((sheet) => {
     document.adoptedStyleSheets = document.adoptedStyleSheets.filter((other) => other !== sheet);
   });
