@@ -122,6 +122,12 @@ const MAX_FINE_HULL: usize = 2 * MAX_HULL;
 /// million; that many take about seven seconds.
 const MAX_VISITS: u64 = 40_000_000;
 
+/// Number of rows of voxels, of [`MAX_ROWS`], that take as long as a visit.
+const ROWS_PER_VISIT: f64 = 10.0;
+
+/// Number of visits that take as long as making a hull, for each of its vertices.
+const VISITS_PER_VERTEX: usize = 60;
+
 /// Limit on the gaps that a report names.
 const MAX_NOTICES: usize = 3;
 
@@ -147,7 +153,7 @@ pub fn generate(
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
     if options.smooth > 0 {
-        return smooth::generate(positions, triangles, options, progress);
+        return smooth::generate(positions, triangles, options, &Effort::default(), progress);
     }
     generate_plain(positions, triangles, options, &Effort::default(), progress)
 }
@@ -167,8 +173,19 @@ impl Effort {
         self.0.get() / 2
     }
 
+    /// Whether most of the visits are spent.
+    fn is_low(&self) -> bool {
+        self.0.get() < MAX_VISITS / 2
+    }
+
     fn spend(&self, visits: u64) {
         self.0.set(self.0.get().saturating_sub(visits));
+    }
+
+    /// Spends what making hulls with that many vertices takes, but at most half of what is left, so that some remains
+    /// for simplifying them.
+    fn spend_on_hulls(&self, n_vertices: usize) {
+        self.spend(self.next_limit().min((VISITS_PER_VERTEX * n_vertices) as u64));
     }
 }
 
@@ -189,7 +206,9 @@ fn generate_plain(
         if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
     };
     let finest = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
-    let affordable = affordable_voxels(finest.n_rows(positions, triangles, &go_on)?);
+    let rows = finest.n_rows(positions, triangles, &go_on)?;
+    effort.spend((MAX_ROWS.min(rows as f64) / ROWS_PER_VISIT) as u64);
+    let affordable = affordable_voxels(rows);
     let base = first_voxels(target).min(affordable);
     let most_gaps = target / VERTICES_PER_GAP;
     let narrow = match (options.kind, options.smooth) {
@@ -215,8 +234,15 @@ fn generate_plain(
             let of = (mirrors, narrow.handles);
             let shell =
                 |n| Shell::new(positions, triangles, bounds, (n, narrow.stretch), of, options, &go_on);
-            let parts = |n| shell(n).map(|shell| (shell.separate, shell.hull.positions.len()));
-            Components::find(parts, [base, affordable], target)?
+            let n_vertices = Cell::new(0);
+            let parts = |n| {
+                let shell = shell(n)?;
+                n_vertices.set(n_vertices.get() + shell.hull.positions.len());
+                Ok((shell.separate, shell.hull.positions.len()))
+            };
+            let found = Components::find(parts, [base, affordable], target)?;
+            effort.spend_on_hulls(n_vertices.get());
+            found
         }
         _ => Components::ONE,
     };
@@ -272,7 +298,8 @@ fn generate_plain(
         }
     }
     let Some((_, Attempt { cage, shell, hull, voxels, .. })) = best else {
-        return Err(CageGenError::Unresolved);
+        let error = if effort.is_low() { CageGenError::TooLong } else { CageGenError::Unresolved };
+        return Err(error);
     };
     let (parts, first) = (n_parts(&cage), first.voxels.max(model.least));
     let coarser = (options.voxels > 0 && voxels < first).then(|| {
@@ -414,6 +441,7 @@ impl Model<'_> {
                 let lattice = (voxels, stretch);
                 let mut shell =
                     Shell::new(positions, triangles, self.bounds, lattice, of, options, &voxelize)?;
+                self.effort.spend_on_hulls(shell.hull.positions.len());
                 if self.narrow.keeps {
                     shell.find_gaps(&self.soup, [voxels, self.most_gaps]);
                 }

@@ -336,6 +336,12 @@ pub enum CageGenError {
         "no cage passes the final check: the model is too small for its distance from the origin; move it to the origin"
     )]
     Unresolved,
+    /// The searches reached their limit before a cage passed verification.
+    #[error(
+        "no cage was found within the limit on searches: use a file for each component, a simpler model or no \
+         smooth steps"
+    )]
+    TooLong,
     /// No sleeves were made. The text is one sentence.
     #[error("no cage of sleeves: {0}")]
     Sleeves(String),

@@ -13,14 +13,17 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::progress::Progress;
 
 /// Clearances that are tried in this order, as fractions of the diagonal of the model's box. All test models need at
-/// most 0.05; the larger clearances are a reserve.
-const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
+/// most 0.05; the larger clearances are a reserve. A model that takes long gets the first ones and [`MAX_CLEARANCE`].
+const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, MAX_CLEARANCE];
+
+const MAX_CLEARANCE: f32 = 0.12;
 
 /// Generates a cage whose surface encloses the model after `options.smooth` subdivision steps.
 pub(super) fn generate(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,
+    effort: &Effort,
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
     options::check(positions, triangles, options)?;
@@ -30,16 +33,19 @@ pub(super) fn generate(
         [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
     });
     let points: Vec<Vec3> = positions.iter().copied().chain(middles).collect();
-    let (began, effort) = (progress.now_ms(), Effort::default());
+    let began = progress.now_ms();
     for (attempt, room) in
         (1u32..).zip(CLEARANCES.into_iter().filter(|&room| room == 0.0 || room > options.clearance))
     {
+        if effort.is_low() && room < MAX_CLEARANCE {
+            continue;
+        }
         let clearance = room.max(options.clearance);
         let mut made = super::generate_plain(
             positions,
             triangles,
             &CageOptions { clearance, ..*options },
-            &effort,
+            effort,
             progress,
         )?;
         let mut mesh = made.cage.to_polygon_mesh();

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::{
     CageGenError, CageKind, CageOptions, CageReport, Effort, GeneratedCage, Lattice, MAX_FINE_HULL, MAX_ROWS,
     MAX_VISITS, Mirror, Mirrors, Shell, Simplification, Symmetry, check_input, generate, simplify_hull,
+    smooth,
 };
 use cagework_core::bind::bind;
 use cagework_core::cage::{Cage, subdivided_box};
@@ -502,6 +503,27 @@ fn collapsing_ends_when_the_searches_take_too_long() {
     let needed = MAX_VISITS - left;
     assert_eq!(simplified(needed), (true, simplified(needed).1));
     assert!(simplified(needed).1 > 0, "half of the visits are left for coarser lattices");
+}
+
+/// Makes a smooth cage of a tube with a limit on the visits.
+fn smooth_tube(visits: u64) -> Result<GeneratedCage, CageGenError> {
+    let (positions, triangles) = tube(&segment(Vec3::ZERO, Vec3::X), 0.2, false);
+    let options = CageOptions { smooth: 1, ..options(20) };
+    smooth::generate(&positions, &triangles, &options, &Effort(Cell::new(visits)), &NoProgress)
+}
+
+/// Of eight clearances, the first ones are tried while most of the visits are left, and then the largest.
+#[test]
+fn smooth_cages_skip_clearances_when_the_searches_take_too_long() {
+    let attempts = |visits| smooth_tube(visits).unwrap().report.attempts;
+    assert!(attempts(MAX_VISITS) < 8, "{}", attempts(MAX_VISITS));
+    assert_eq!(attempts(MAX_VISITS / 2 - 1), 8);
+}
+
+#[test]
+fn an_error_says_that_the_searches_took_too_long() {
+    let made = smooth_tube(0);
+    assert!(matches!(made, Err(CageGenError::TooLong)), "{:?}", made.map(|made| made.report));
 }
 
 #[test]
