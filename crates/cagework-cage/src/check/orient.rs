@@ -57,26 +57,15 @@ pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Ve
     components
 }
 
-/// Components with fewer triangles are not tested for enclosing other components: two triangles enclose no volume.
-const MIN_ENCLOSING_TRIANGLES: usize = 3;
-
 /// Flips whole components whose volume has the wrong sign. The volume must be positive, or negative for a cavity: a
-/// component that lies inside an odd number of other components.
+/// component that lies inside an odd number of other components. There are no cavities if [`Solid::depths`] would take
+/// too long.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
-    // A triangle soup may have as many components as faces. Therefore only components that can enclose another one are
-    // searched for nested ones.
-    let (solids, can_enclose): (Vec<Solid>, Vec<bool>) = components
-        .iter()
-        .map(|component| triangles(mesh, component))
-        .map(|triangles| {
-            let can_enclose = triangles.len() >= MIN_ENCLOSING_TRIANGLES;
-            (Solid::new(triangles), can_enclose)
-        })
-        .unzip();
-    let around: Vec<usize> = (0..solids.len()).filter(|&j| can_enclose[j]).collect();
-    for (k, component) in components.iter_mut().enumerate() {
-        let depth = around.iter().filter(|&&j| j != k && solids[k].is_inside(&solids[j])).count();
-        if (solids[k].volume < 0.0) != (depth % 2 == 1) {
+    let solids: Vec<Solid> =
+        components.iter().map(|component| Solid::new(triangles(mesh, component))).collect();
+    let depths = Solid::depths(&solids).unwrap_or_else(|_| vec![0; solids.len()]);
+    for ((component, solid), depth) in components.iter_mut().zip(solids).zip(depths) {
+        if (solid.volume < 0.0) != (depth % 2 == 1) {
             for turn in &mut component.turn {
                 *turn = !*turn;
             }

@@ -42,6 +42,23 @@ fn a_far_unused_vertex_does_not_make_a_valid_cage_faulty() {
     assert_eq!(codes(&mesh), [Code::UnusedVertex]);
 }
 
+/// Of 1,500 boxes inside each other, each pair takes 11 samples and 12 triangles.
+#[test]
+fn components_inside_each_other_are_compared_up_to_a_limit() {
+    let mut boxes = PolygonMesh { positions: Vec::new(), faces: Vec::new() };
+    for k in 1..=1500_u16 {
+        let corner = Vec3::splat(f32::from(k));
+        let shell = subdivided_box(Bounds { min: -corner, max: corner }, 0.0, [1; 3]);
+        let first = boxes.positions.len() as u32;
+        boxes.faces.extend(shell.faces.iter().map(|face| face.iter().map(|&i| first + i).collect()));
+        boxes.positions.extend(shell.positions);
+    }
+    let found = check(&boxes, None, None);
+    let sentence = "cage has 1500 components, and too many inside each other: comparing them visits 148401000 \
+                    triangles, more than the limit of 134217728: remove inner components";
+    assert_eq!(found.problem(Code::NotACage).unwrap().message, sentence);
+}
+
 #[test]
 fn holes_are_reported_with_their_edges_and_filled() {
     let mut mesh = box_mesh(2);

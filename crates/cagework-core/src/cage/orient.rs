@@ -17,6 +17,9 @@ const MAX_OUTSIDE_WINDING: f64 = 0.25;
 /// Limit on the triangles that the tests of nested components visit. Each takes about 40 ns, so all take 5 s.
 const MAX_NESTING_TRIANGLES: u64 = 1 << 27;
 
+/// Components with fewer triangles are not tested for enclosing other components: two triangles enclose no volume.
+const MIN_ENCLOSING_TRIANGLES: usize = 3;
+
 /// Orients the faces of every component away from the solid (outward, or into a cavity) and projects all faces to their
 /// planes. `diagonal`: diagonal of the cage's bounding box.
 pub(super) fn orient(
@@ -47,16 +50,12 @@ pub(super) fn orient(
             return Err(CageError::Flat { component: component as u32, face: faces_of[component][0] as u32 });
         }
     }
-    let others = |component: usize| (0..solids.len()).filter(move |&k| k != component);
-    let cost = |(component, solid): (usize, &Solid)| -> u64 {
-        others(component).map(|k| solid.cost_of_is_inside(&solids[k])).sum()
-    };
-    let needed: u64 = solids.iter().enumerate().map(cost).sum();
-    if needed > MAX_NESTING_TRIANGLES {
-        return Err(CageError::Nested { components: solids.len(), needed, limit: MAX_NESTING_TRIANGLES });
-    }
-    for (component, solid) in solids.iter().enumerate() {
-        let depth = others(component).filter(|&k| solid.is_inside(&solids[k])).count();
+    let depths = Solid::depths(&solids).map_err(|needed| CageError::Nested {
+        components: solids.len(),
+        needed,
+        limit: MAX_NESTING_TRIANGLES,
+    })?;
+    for (component, (solid, depth)) in solids.iter().zip(depths).enumerate() {
         let cavity = depth % 2 == 1;
         let faces = &faces_of[component];
         if (solid.volume < 0.0) != cavity {
@@ -107,6 +106,28 @@ impl Solid {
         Self { triangles, min, max, volume, area }
     }
 
+    /// Counts the components that each component lies inside.
+    ///
+    /// # Errors
+    /// The number of triangles to visit, if it exceeds the limit of 2^27.
+    pub fn depths(solids: &[Self]) -> Result<Vec<usize>, u64> {
+        // A triangle soup may have as many components as triangles.
+        let can_enclose = |k: &usize| solids[*k].triangles.len() >= MIN_ENCLOSING_TRIANGLES;
+        let around: Vec<usize> = (0..solids.len()).filter(can_enclose).collect();
+        let others = |component: usize| around.iter().filter(move |&&k| k != component).map(|&k| &solids[k]);
+        let cost = |(component, solid): (usize, &Self)| -> u64 {
+            others(component).map(|other| solid.cost_of_is_inside(other)).sum()
+        };
+        let needed: u64 = solids.iter().enumerate().map(cost).sum();
+        if needed > MAX_NESTING_TRIANGLES {
+            return Err(needed);
+        }
+        let depth = |(component, solid): (usize, &Self)| {
+            others(component).filter(|other| solid.is_inside(other)).count()
+        };
+        Ok(solids.iter().enumerate().map(depth).collect())
+    }
+
     /// Number of points of this component that [`Self::is_inside`] tests; 0 if the bounding boxes decide.
     fn samples(&self, other: &Self) -> usize {
         let n = self.triangles.len();
@@ -122,8 +143,7 @@ impl Solid {
     }
 
     /// Whether this component lies inside `other`; false if they overlap, or without triangles.
-    #[must_use]
-    pub fn is_inside(&self, other: &Self) -> bool {
+    fn is_inside(&self, other: &Self) -> bool {
         let (n, samples) = (self.triangles.len(), self.samples(other));
         if samples == 0 {
             return false;
