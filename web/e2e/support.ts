@@ -366,7 +366,9 @@ export async function drawing(page: Page): Promise<Buffer> {
     document.adoptedStyleSheets.push(sheet);
     return sheet;
   });
-  const picture = await page.screenshot({ clip: { x: x + 1, y: y + 1, width: width - 2, height: height - 2 } });
+  const picture = await page.screenshot({
+    clip: { x: x + 1, y: y + 1, width: width - 2, height: height - 2 },
+  });
   await sheet.evaluate((sheet) => {
     document.adoptedStyleSheets = document.adoptedStyleSheets.filter((other) => other !== sheet);
   });
