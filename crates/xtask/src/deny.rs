@@ -15,12 +15,20 @@ use crate::command::{output, root};
 /// # Errors
 /// Lists every package that breaks a rule.
 pub(crate) fn check() -> Result<(), String> {
-    let path = root().join("deny.toml");
-    let rules = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let said = output("cargo", &["metadata", "--locked", "--all-features", "--format-version", "1"])?;
-    let said: Value = serde_json::from_str(&said).map_err(|e| format!("cargo metadata: {e}"))?;
-    let faults = faults(&rules, &said)?;
+    let faults = faults(&rules()?, &metadata()?)?;
     if faults.is_empty() { Ok(()) } else { Err(format!("deny.toml: {}", faults.join("\n"))) }
+}
+
+/// Reads `deny.toml`.
+pub(crate) fn rules() -> Result<String, String> {
+    let path = root().join("deny.toml");
+    fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Asks cargo for all packages.
+pub(crate) fn metadata() -> Result<Value, String> {
+    let said = output("cargo", &["metadata", "--locked", "--all-features", "--format-version", "1"])?;
+    serde_json::from_str(&said).map_err(|e| format!("cargo metadata: {e}"))
 }
 
 fn faults(rules: &str, metadata: &Value) -> Result<Vec<String>, String> {
@@ -46,8 +54,8 @@ fn faults(rules: &str, metadata: &Value) -> Result<Vec<String>, String> {
     Ok(faults)
 }
 
-/// Reads the strings of a list: the quoted texts between its brackets.
-fn list(rules: &str, key: &str) -> Result<Vec<String>, String> {
+/// Reads the strings of a list in TOML: the quoted texts between its brackets.
+pub(crate) fn list(rules: &str, key: &str) -> Result<Vec<String>, String> {
     let start = format!("{key} = [");
     let rest =
         rules.split_once(&start).map(|(_, rest)| rest).ok_or(format!("there is no list '{}'", key.trim()))?;

@@ -2,6 +2,7 @@
 //!
 //! `cargo xtask TASK` does the same if Rust is installed; `crates/xtask/run.sh` installs it.
 
+mod advisories;
 mod arrows;
 mod command;
 mod deny;
@@ -44,6 +45,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   wheel-notices  the licences that the wheel contains, for other builds of it
   archive [TARGET]  the release `cagework` with its licences, for this machine or TARGET, into target/archives
   release-check TAG  whether versions, changelog and addresses are ready to be released as TAG
+  advisories FOLDER  the committed snapshot of the RustSec database, from a clone of it
   npm            the npm package only: packed, installed into a blank project and tested there, in Node and in a browser
   npm-pack       the npm package, packed into target/npm
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/package/src/pkg
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
         ["test-all"] => tasks::test(Tier::All),
         ["test-long"] => tasks::test_long(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
+        ["advisories", folder] => advisories::update(folder.as_ref()),
         ["check"] => tasks::check(),
         ["check-and-build"] => tasks::check_and_build(),
         ["test-beside"] => tasks::test_beside(Tier::All),

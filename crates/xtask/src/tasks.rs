@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::command::{root, run};
 use crate::npm::{self, exec};
 use crate::parts::{self, part};
-use crate::{arrows, deny, licences, package, python, release, site, wasm};
+use crate::{advisories, arrows, deny, licences, package, python, release, site, wasm};
 
 /// Builds the `cagework` command in release mode and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -175,6 +175,7 @@ fn check_rust() -> Result<(), String> {
 fn check_files() -> Result<(), String> {
     arrows::check()?;
     deny::check()?;
+    advisories::check()?;
     release::check_manifests()?;
     // Packs every crate that does not say `publish = false`. Fails if one lacks metadata or files, or depends on a
     // crate that is not published. Building the packages is left to the same command before a release.
