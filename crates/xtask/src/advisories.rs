@@ -1,8 +1,8 @@
 //! Compares the packages in `Cargo.lock` with the advisories of the RustSec database.
 //!
-//! `advisories.tsv` is a snapshot of the database (CC0), so that the check needs no network; the nightly workflow asks
-//! the database itself. `cargo xtask advisories FOLDER` makes a new snapshot from a clone of
-//! <https://github.com/rustsec/advisory-db>.
+//! `advisories.tsv` has identifiers and versions from the database (CC0, a few entries CC BY 4.0), so that the check
+//! needs no network; the nightly workflow asks the database itself. `cargo xtask advisories FOLDER` writes the file from
+//! a clone of <https://github.com/rustsec/advisory-db>.
 
 use std::fmt::Write as _;
 use std::fs;
