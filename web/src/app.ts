@@ -74,7 +74,7 @@ export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "v
   const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project, pull);
   const startFresh = () => void files.openSample(store.get().samples[0] ?? "");
-  const works = createWorks(ctx, { write: project.write, openFiles, startFresh });
+  const works = createWorks(ctx, { write: project.writeKept, openFiles, startFresh });
   const files = createFiles(ctx, {
     know,
     made,

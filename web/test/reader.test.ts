@@ -1,7 +1,7 @@
 import { type Client, named } from "@cagework/core/session/client";
 import { readFiles, siblingOf } from "@cagework/core/session/files";
 import { createSeparateWorkers } from "@cagework/core/session/reader";
-import { expect, it } from "vitest";
+import { expect, it, vi } from "vitest";
 import type { NamedFile } from "../src/contract";
 import { T } from "../src/words";
 
@@ -55,6 +55,16 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
   await expect(alone.done).rejects.toThrow("reading this file failed unexpectedly");
 });
 
+it("the worker of a large file is closed at once, because its memory never shrinks", async () => {
+  const { opened, open } = workers();
+  const apart = createSeparateWorkers(open);
+  apart.share();
+  const first = apart("read", { files: [file("a.glb", 17 << 20)], up: undefined });
+  opened[0]?.answer({ vertices: 3 });
+  await first.done;
+  expect(opened[0]?.closed).toBe(1);
+});
+
 it("a cancellation or another file ends the current read", async () => {
   const { opened, open } = workers();
   const apart = createSeparateWorkers(open);
@@ -102,4 +112,21 @@ it("OBJ and glTF read their sibling files, other formats none", async () => {
     expect([text(find("./fox.mtl")), text(find("textures/fur.png"))]).toEqual(["fox.mtl", "fur.png"]);
   }
   expect((await readFiles([dropped("fox.stl"), ...beside])).siblings.size).toBe(0);
+});
+
+it("in a browser's worker, a sibling file is read when the model asks for it", async () => {
+  const asked: Blob[] = [];
+  vi.stubGlobal(
+    "FileReaderSync",
+    class {
+      readAsArrayBuffer(blob: Blob) {
+        asked.push(blob);
+        return new ArrayBuffer(3);
+      }
+    },
+  );
+  const [used, unused] = [file("fur.png"), file("other.png")];
+  const find = siblingOf((await readFiles([file("fox.obj"), used, unused])).siblings);
+  expect([find("fur.png")?.length, asked]).toEqual([3, [used.file]]);
+  vi.unstubAllGlobals();
 });

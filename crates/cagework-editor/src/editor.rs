@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::view::View;
 use cagework_core::{Bounds, PolygonMesh};
-use cagework_io::{Model, write_project};
+use cagework_io::{Model, WritePieces, write_project_in_pieces};
 use cagework_pose::blend::{VertexCountError, blend};
 use cagework_pose::humanoid::{Bone, Humanoid, HumanoidError};
 use cagework_pose::proportions::{HumanoidCage, Proportions};
@@ -584,12 +584,28 @@ impl Editor {
     /// # Errors
     /// If no model is open, or the file would be too large.
     pub fn write_project(&self, settings: &str) -> Result<Vec<u8>, EditError> {
+        let mut file = Vec::new();
+        self.write_project_in_pieces(settings, u64::MAX, &mut |pieces| file = pieces.concat())?;
+        Ok(file)
+    }
+
+    /// As [`Self::write_project`], for a file of at most `limit` bytes, without a copy of the models. `write` is called
+    /// once.
+    ///
+    /// # Errors
+    /// If no model is open, or the file would be too large.
+    pub fn write_project_in_pieces(
+        &self,
+        settings: &str,
+        limit: u64,
+        write: &mut WritePieces<'_>,
+    ) -> Result<(), EditError> {
         let Document { models, cage, poses, .. } = &self.document;
         let models: Vec<&Model> = models.iter().map(|member| &*member.model).collect();
         let poses: Vec<(String, Vec<Vec3>)> =
             poses.iter().map(|pose| (pose.name.to_string(), pose.positions.to_vec())).collect();
         let settings = DocumentSettings::from_document(&self.document).beside(settings);
-        Ok(write_project(&models, &cage.mesh, &poses, &settings)?)
+        Ok(write_project_in_pieces(&models, &cage.mesh, &poses, &settings, limit, write)?)
     }
 
     /// The part of the document that panels show.

@@ -1,6 +1,6 @@
 //! Errors of writing models and of reading poses.
 
-use cagework_core::words::counted;
+use cagework_core::words::{counted, size_rounded_down, size_rounded_up};
 use thiserror::Error;
 
 use crate::shown::shown;
@@ -80,6 +80,18 @@ pub enum WriteError {
     TooLarge {
         /// Size that the export would have.
         bytes: u64,
+    },
+    /// A project would be larger than the caller allows.
+    #[error(
+        "the project takes {}, more than the limit of {}",
+        size_rounded_up(*bytes),
+        size_rounded_down(*limit)
+    )]
+    Limit {
+        /// Size that the file would have, or a lower limit of it, bytes.
+        bytes: u64,
+        /// Largest size that the caller allows, bytes.
+        limit: u64,
     },
     /// A GLB of this many corners could not be read again.
     #[error(

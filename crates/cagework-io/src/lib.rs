@@ -68,7 +68,10 @@ pub use part_kind::PartKind;
 pub use point_file::{PointFile, PointFileError};
 pub use polygons::PolygonsError;
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
-pub use project::{Project, ProjectError, position_bytes, positions_of, read_project, write_project};
+pub use project::{
+    Project, ProjectError, WritePieces, position_bytes, positions_of, read_project, write_project,
+    write_project_in_pieces,
+};
 pub use rigged::{MAX_CLIP_TIMES, UnknownClip};
 pub use select::SelectError;
 pub use shown::{json_fault, shown, value_fault, without_byte_order_mark};

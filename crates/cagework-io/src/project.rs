@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
+use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, Pieces, push};
 use crate::model::{Document, Model, ModelFormat, ReadError};
 use crate::origin::translation;
 use crate::shown::shown;
@@ -64,6 +64,9 @@ pub enum ProjectError {
     },
 }
 
+/// Callback that takes the pieces of a file, in their order.
+pub type WritePieces<'a> = dyn FnMut(&[Cow<'_, [u8]>]) + 'a;
+
 /// Writes a project as one GLB.
 ///
 /// `models`: all with the same up axis and origin, which cage and poses share. `poses`: names and cage
@@ -77,8 +80,32 @@ pub fn write_project(
     poses: &[(String, Vec<Vec3>)],
     settings: &str,
 ) -> Result<Vec<u8>, WriteError> {
+    let mut file = Vec::new();
+    write_project_in_pieces(models, cage, poses, settings, u64::MAX, &mut |pieces| file = pieces.concat())?;
+    Ok(file)
+}
+
+/// As [`write_project`], for a file of at most `limit` bytes, without a copy of the models.
+///
+/// `write` is called once.
+///
+/// # Errors
+/// As [`write_project`], and [`WriteError::Limit`].
+pub fn write_project_in_pieces(
+    models: &[&Model],
+    cage: &PolygonMesh,
+    poses: &[(String, Vec<Vec3>)],
+    settings: &str,
+    limit: u64,
+    write: &mut WritePieces<'_>,
+) -> Result<(), WriteError> {
     let (model, more) =
         models.split_first().ok_or_else(|| WriteError::Document("there is no model".into()))?;
+    let require = |bytes| if bytes > limit { Err(WriteError::Limit { bytes, limit }) } else { Ok(()) };
+    if let Document::Polygons(_) = model.document {
+        // The GLB built from it has at least a position per vertex and three indices of 16 bits per face.
+        require((12 * model.positions.len() + 6 * model.n_faces()) as u64)?;
+    }
     let built;
     // A model in another format is stored beside a GLB built from it, which viewers can show.
     let (document, source) = match &model.document {
@@ -115,12 +142,11 @@ pub fn write_project(
         "node": node, "settings": settings,
     });
     if let Some(source) = source {
-        project["source"] = view(&mut pack, &mut json, source);
+        project["source"] = json!({ "bufferView": pack.push_pieces(&mut json, source) });
     }
     for model in more {
-        let mut part = view(&mut pack, &mut json, file_of(model)?);
-        part["name"] = model.name.as_str().into();
-        push(&mut project, "more", part);
+        let number = pack.push_pieces(&mut json, file_of(model)?);
+        push(&mut project, "more", json!({ "bufferView": number, "name": model.name }));
     }
     project["cage"] = json!({
         "positions": view(&mut pack, &mut json, position_bytes(&cage.positions)),
@@ -138,7 +164,10 @@ pub fn write_project(
     }
     json["extensions"][EXTENSION] = project;
     push(&mut json, "extensionsUsed", EXTENSION.into());
-    pack.finish(json)
+    let file = pack.into_pieces(json)?;
+    require(gltf::length_of(&file) as u64)?;
+    write(&file);
+    Ok(())
 }
 
 /// Reads a project using at most `memory_limit` bytes. `None` if the file is not a project.
@@ -228,19 +257,21 @@ fn view<'a>(pack: &mut Pack<'a>, json: &mut Value, bytes: impl Into<Cow<'a, [u8]
 }
 
 /// Returns the model as a self-contained file of its own format.
-fn file_of(model: &Model) -> Result<Cow<'_, [u8]>, WriteError> {
+fn file_of(model: &Model) -> Result<Pieces<'_>, WriteError> {
     match (&model.document, model.format()) {
         (Document::Gltf(document), _) => {
             let (mut json, mut pack) = (document.json.clone(), Pack::of(document));
             gltf::embed_images(document, &mut json, &mut pack);
-            Ok(pack.finish(json)?.into())
+            pack.into_pieces(json)
         }
         (Document::Polygons(document), ModelFormat::Obj | ModelFormat::ThreeMf) => {
-            Ok(document.bytes.as_slice().into())
+            Ok(vec![document.bytes.as_slice().into()])
         }
-        (_, ModelFormat::Sog) => Ok(model.capture.as_ref().map_or(&[][..], |capture| &capture.file).into()),
+        (_, ModelFormat::Sog) => {
+            Ok(vec![model.capture.as_ref().map_or(&[][..], |capture| &capture.file).into()])
+        }
         // Documents of PLY, STL and OFF do not keep the bytes of their file: write it again.
-        (_, format) => Ok(model.write(format, &model.positions)?.into()),
+        (_, format) => Ok(vec![model.write(format, &model.positions)?.into()]),
     }
 }
 

@@ -24,6 +24,8 @@ pub(crate) enum ErrorName {
     Cancelled,
     /// A file cannot be read.
     Format,
+    /// The work is too large to be saved while the user works.
+    TooLarge,
     /// A bind needs more memory than its limit.
     Memory,
     /// A bind needs more memory than its limit, and most of it is for weights.
@@ -139,8 +141,12 @@ impl From<JobError> for Fault {
 
 impl From<EditError> for Fault {
     fn from(error: EditError) -> Self {
-        let is_missing = matches!(error, EditError::NoModel | EditError::NoCage);
-        Self::new(if is_missing { ErrorName::Missing } else { ErrorName::Error }, error)
+        let name = match error {
+            EditError::NoModel | EditError::NoCage => ErrorName::Missing,
+            EditError::Rig(WriteError::Limit { .. }) => ErrorName::TooLarge,
+            _ => ErrorName::Error,
+        };
+        Self::new(name, error)
     }
 }
 

@@ -17,9 +17,16 @@ use crate::views::object;
 /// use, because drawing and binding need memory too.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
-/// Limit on the memory of models that are open together, bytes. While models are opened, each is in memory three times: in
-/// the arrays from the worker, in the page's module and in the saved work.
+/// Limit on the memory of models that are open together, bytes. Three files of 100 MB with
+/// large textures take 1 GiB of a tab: the last one is in memory three times while a worker reads it, beside the arrays
+/// of the others.
 pub(crate) const HELD_LIMIT: u64 = READ_LIMIT / 3;
+
+/// Limit on the project file that is saved while the user works, bytes. Saving a larger one pauses the page.
+pub(crate) const KEPT_LIMIT: u64 = 200 << 20;
+
+/// Bytes of a project file that are copied out of the module at a time.
+pub(crate) const KEPT_PIECE: usize = 8 << 20;
 
 /// Whether a bind runs on the CPU: because the options say so, the build has no WebGPU, or the solver has no GPU version.
 pub(crate) fn is_on_cpu(request: &PageBindOptions) -> bool {

@@ -10,18 +10,29 @@ import type { ControlActions } from "./controls";
 export function createProject(ctx: Context, shared: ControlActions["shared"]) {
   const { store } = ctx;
 
-  const write = (): Uint8Array<ArrayBuffer> => {
+  const settings = (): string => {
     const state = store.get();
     const { cageOptions: cage, tools, rigOptions: rig, model } = state;
     const { symmetry } = tools;
-    const settings = { bind: optionsInUse(state), cage, symmetry, rig: model?.rigged ? rig : undefined };
-    // wasm-bindgen copies the bytes out of the wasm memory, so their buffer is an ArrayBuffer of its own.
-    return ctx.engine().writeProject(JSON.stringify(settings)) as Uint8Array<ArrayBuffer>;
+    return JSON.stringify({
+      bind: optionsInUse(state),
+      cage,
+      symmetry,
+      rig: model?.rigged ? rig : undefined,
+    });
   };
 
   return {
+    // wasm-bindgen copies the bytes out of the wasm memory, so their buffer is an ArrayBuffer of its own.
     /** Returns the bytes of a project file with the open work. */
-    write,
+    write: () => ctx.engine().writeProject(settings()) as Uint8Array<ArrayBuffer>,
+    /** As `write`, for the work that is saved while the user works. Throws `TooLarge` above a limit. */
+    writeKept(): Blob {
+      const pieces: Blob[] = [];
+      // A Blob keeps its bytes outside the memory of the page.
+      ctx.engine().writeKept(settings(), (piece: Uint8Array<ArrayBuffer>) => pieces.push(new Blob([piece])));
+      return new Blob(pieces);
+    },
     fileName: (): string => `${exportStem(store.get().model?.name ?? "model")}.cagework.glb`,
     /** Creates a link to the open work; undefined if a link cannot contain it. */
     async link(): Promise<string | undefined> {

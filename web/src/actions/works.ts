@@ -14,12 +14,10 @@ import { attempt, type Context } from "./context";
  * the last save took on the main thread. Large models are saved less often.
  */
 const PAUSE_MS = { least: 50, most: 1500, ratio: 20 };
-/** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
-const MAX_SAVED_BYTES = 200e6;
 
 export interface WorkNeeds {
-  /** The project file of the open work. */
-  write(): Uint8Array;
+  /** The project file of the open work. Throws an error named `TooLarge` if it is too large to be saved often. */
+  write(): Blob;
   /** Opens files, as a drop does. */
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
   startFresh(): void;
@@ -47,23 +45,23 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     }
     hasFailed = true;
     const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
+    const isLarge = error instanceof Error && error.name === "TooLarge";
     // Other errors mean that the browser forbids storage, as in private windows.
-    const text = isFull ? T.works.full(name) : T.works.forbidden;
+    const text = isFull
+      ? T.works.full(name)
+      : isLarge
+        ? T.works.large(name, error.message)
+        : T.works.forbidden;
     ctx.tell.say(text, ...(isFull ? [showList] : []));
   };
 
-  /** Makes the entry and the project file of the open work; undefined if it is too large. */
-  const made = (): { entry: Entry; file: Blob } | undefined => {
+  /** Makes the entry and the project file of the open work. */
+  const made = (): { entry: Entry; file: Blob } => {
     const began = performance.now();
     const when = Date.now();
     const name = current?.name ?? store.get().model?.name ?? "";
-    const file = new Blob([write() as BlobPart]);
+    const file = write();
     cost = performance.now() - began;
-    if (file.size > MAX_SAVED_BYTES) {
-      hasFailed = true;
-      ctx.tell.say(T.works.large(name, file.size, MAX_SAVED_BYTES));
-      return undefined;
-    }
     if (!current) {
       const id = newId();
       const lock = hold(id);
@@ -76,7 +74,6 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const put = async () => {
     try {
       const work = made();
-      if (!work) return;
       await writeEntry(work.entry, work.file);
       store.set({ savedAt: work.entry.when });
       await refresh();
@@ -118,7 +115,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     timer = undefined;
     try {
       const work = made();
-      if (work) writeLast(work.entry, work.file);
+      writeLast(work.entry, work.file);
     } catch {
       // The page that opens next says that the last change is lost.
     }

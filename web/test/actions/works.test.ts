@@ -57,11 +57,14 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-function page({ isEmpty = false } = {}) {
+function page({ isEmpty = false, tooLarge = "" } = {}) {
   const fake = createFake();
   const opened: string[] = [];
   const works = createWorks(fake.ctx, {
-    write: () => new Uint8Array(10),
+    write() {
+      if (tooLarge) throw Object.assign(new Error(tooLarge), { name: "TooLarge" });
+      return new Blob([new Uint8Array(10)]);
+    },
     async openFiles(files: readonly NamedFile[]) {
       opened.push(files[0]?.name ?? "");
       return true;
@@ -132,6 +135,16 @@ it("opening another model saves the previous work and offers it", async () => {
     [],
     null,
   ]);
+});
+
+it("work that is too large is not kept, and the reason is said once", async () => {
+  const { works, said } = page({ tooLarge: "the project takes 300 MiB, more than the limit of 200 MiB" });
+  for (let k = 0; k < 2; k++) {
+    works.touch();
+    await vi.advanceTimersByTimeAsync(2000);
+  }
+  expect([kept.size, said.length]).toEqual([0, 1]);
+  expect(said[0]).toMatch(/^Your work on cube\.obj is not kept.*: the project takes 300 MiB.*200 MiB\. /);
 });
 
 it("a full disk is reported once, with a remedy", async () => {

@@ -54,7 +54,7 @@ pub(crate) use container::{glb_of, glb_parts, named_files};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;
-pub(crate) use pack::{Pack, push};
+pub(crate) use pack::{Pack, Pieces, length_of, push};
 pub(crate) use patch::{Rest, embed_images, patch};
 pub(crate) use rig::joints_with_vertices;
 pub use rig::{

@@ -17,6 +17,8 @@ pub(super) const VERTICES: u32 = 34962;
 pub(super) const INDICES: u32 = 34963;
 /// Alignment of accessors and buffer views, bytes: a multiple of the sizes of all component types.
 const ALIGN: usize = 4;
+/// Padding; never longer than this.
+const ZEROS: [u8; 2 * ALIGN] = [0; 2 * ALIGN];
 
 /// Name of the glTF extension that stores a project.
 pub const PROJECT_EXTENSION: &str = "CAGEWORK_project";
@@ -38,10 +40,25 @@ const KNOWN_EXTENSIONS: [&str; 12] = [
     PROJECT_EXTENSION,
 ];
 
+/// Bytes that are written one after the other. A file in pieces is not copied before all of it is known.
+pub(crate) type Pieces<'a> = Vec<Cow<'a, [u8]>>;
+
 /// The buffer views of a document that is being written.
 pub(crate) struct Pack<'a> {
-    /// Bytes of each buffer view and their offset modulo [`ALIGN`]; `None` if out of bounds.
-    views: Vec<Option<(Cow<'a, [u8]>, usize)>>,
+    /// `None` if the view is longer than its buffer.
+    views: Vec<Option<View<'a>>>,
+}
+
+struct View<'a> {
+    pieces: Pieces<'a>,
+    /// Offset modulo [`ALIGN`].
+    phase: usize,
+}
+
+impl View<'_> {
+    fn len(&self) -> usize {
+        length_of(&self.pieces)
+    }
 }
 
 impl<'a> Pack<'a> {
@@ -55,7 +72,7 @@ impl<'a> Pack<'a> {
         let views = (0u64..).zip(&document.root.buffer_views).map(|(number, view)| {
             let bytes = view_bytes(&document.root, &document.buffers, number)?;
             let start = view.byte_offset.map_or(0, |o| o.0) as usize;
-            Some((bytes.into(), start % ALIGN))
+            Some(View { pieces: vec![bytes.into()], phase: start % ALIGN })
         });
         Self { views: views.collect() }
     }
@@ -65,7 +82,8 @@ impl<'a> Pack<'a> {
         let views = json["bufferViews"].as_array().into_iter().flatten().map(|view| {
             let [start, length] =
                 ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap_or(0) as usize);
-            Some((bin.get(start..start.checked_add(length)?)?.into(), start % ALIGN))
+            let bytes = bin.get(start..start.checked_add(length)?)?;
+            Some(View { pieces: vec![bytes.into()], phase: start % ALIGN })
         });
         Self { views: views.collect() }
     }
@@ -77,13 +95,18 @@ impl<'a> Pack<'a> {
         bytes: impl Into<Cow<'a, [u8]>>,
         target: Option<u32>,
     ) -> usize {
-        let bytes = bytes.into();
-        let mut view = json!({ "buffer": 0, "byteLength": bytes.len() });
+        let number = self.push_pieces(json, vec![bytes.into()]);
         if let Some(target) = target {
-            view["target"] = target.into();
+            json["bufferViews"][number]["target"] = target.into();
         }
-        self.views.push(Some((bytes, 0)));
-        push(json, "bufferViews", view)
+        number
+    }
+
+    /// Adds a buffer view with these bytes; returns its index.
+    pub(crate) fn push_pieces(&mut self, json: &mut Value, pieces: Pieces<'a>) -> usize {
+        let length = length_of(&pieces);
+        self.views.push(Some(View { pieces, phase: 0 }));
+        push(json, "bufferViews", json!({ "buffer": 0, "byteLength": length }))
     }
 
     /// Adds an f32 accessor with `components` numbers per element; `bounds` adds min and max.
@@ -145,7 +168,12 @@ impl<'a> Pack<'a> {
     }
 
     /// Drops unused accessors and buffer views, lays out the buffer and writes the GLB.
-    pub(crate) fn finish(mut self, mut json: Value) -> Result<Vec<u8>, WriteError> {
+    pub(crate) fn finish(self, json: Value) -> Result<Vec<u8>, WriteError> {
+        Ok(self.into_pieces(json)?.concat())
+    }
+
+    /// As [`Self::finish`], without a copy of the buffer views.
+    pub(crate) fn into_pieces(mut self, mut json: Value) -> Result<Pieces<'a>, WriteError> {
         if only_known_extensions(&json) {
             drop_unused(&mut json, "accessors", each_accessor);
             let kept = drop_unused(&mut json, "bufferViews", each_view);
@@ -164,32 +192,34 @@ impl<'a> Pack<'a> {
                 object.shift_remove(key);
             }
         }
-        write_chunks(&text_of(&json)?, length, |out| {
-            let first = out.len();
-            for ((bytes, _), start) in self.views.iter().flatten().zip(starts) {
-                out.resize(first + start, 0);
-                out.extend_from_slice(bytes);
-            }
-        })
+        let mut pieces = start_of_glb(text_of(&json)?.into(), length)?;
+        let mut end = 0;
+        for (view, start) in self.views.into_iter().flatten().zip(starts) {
+            pieces.push(ZEROS[..start - end].into());
+            end = start + view.len();
+            pieces.extend(view.pieces);
+        }
+        pieces.push(ZEROS[..length - end].into());
+        Ok(pieces)
     }
 
     /// Sets the offsets of all buffer views, and returns them with the length of the buffer.
     fn lay_out(&self, json: &mut Value) -> Result<(Vec<usize>, usize), WriteError> {
-        let bytes: u64 = self.views.iter().flatten().map(|(b, _)| b.len() as u64 + 2 * ALIGN as u64).sum();
+        let bytes: u64 = self.views.iter().flatten().map(|view| (view.len() + 2 * ALIGN) as u64).sum();
         if bytes > u64::from(u32::MAX) {
             return Err(WriteError::TooLarge { bytes });
         }
         let (mut starts, mut end) = (Vec::with_capacity(self.views.len()), 0_usize);
         for (number, view) in self.views.iter().enumerate() {
-            let Some((bytes, phase)) = view else {
+            let Some(view) = view else {
                 return Err(WriteError::Document(format!("buffer view {number} is longer than its buffer")));
             };
             // Alignment is relative to the buffer: keep the offset of the original view modulo 4.
-            let start = end.next_multiple_of(ALIGN) + phase;
+            let start = end.next_multiple_of(ALIGN) + view.phase;
             json["bufferViews"][number]["buffer"] = 0.into();
             json["bufferViews"][number]["byteOffset"] = start.into();
             starts.push(start);
-            end = start + bytes.len();
+            end = start + view.len();
         }
         Ok((starts, end.next_multiple_of(ALIGN)))
     }
@@ -205,33 +235,40 @@ pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
 
 /// Writes a GLB of a document whose only buffer is `bin`.
 pub(super) fn write_glb(json: &Value, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
-    write_chunks(&text_of(json)?, bin.len(), |out| out.extend_from_slice(bin))
+    join_chunks(text_of(json)?.into(), bin)
 }
 
 fn text_of(json: &Value) -> Result<Vec<u8>, WriteError> {
     serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))
 }
 
-/// Writes a GLB (glTF 2.0, section 4.4) without a second copy of its binary chunk, whose `length` bytes `fill` appends.
-fn write_chunks(text: &[u8], length: usize, fill: impl FnOnce(&mut Vec<u8>)) -> Result<Vec<u8>, WriteError> {
+fn join_chunks(text: Cow<'_, [u8]>, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
+    let mut pieces = start_of_glb(text, bin.len())?;
+    let padding = bin.len().next_multiple_of(ALIGN) - bin.len();
+    pieces.extend([bin.into(), ZEROS[..padding].into()]);
+    Ok(pieces.concat())
+}
+
+/// A GLB (glTF 2.0, section 4.4) up to the first byte of its binary chunk, which will have `length` bytes and, after
+/// them, zeros up to a multiple of [`ALIGN`].
+fn start_of_glb(text: Cow<'_, [u8]>, length: usize) -> Result<Pieces<'_>, WriteError> {
     let [json, bin] = [text.len(), length].map(|length| (length as u64).next_multiple_of(ALIGN as u64));
     let bytes = 20 + json + if bin > 0 { 8 + bin } else { 0 };
     if bytes > u64::from(u32::MAX) {
         return Err(WriteError::TooLarge { bytes });
     }
     let word = |number: u64| (number as u32).to_le_bytes();
-    let mut out = Vec::with_capacity(bytes as usize);
-    for part in [&b"glTF"[..], &word(2), &word(bytes), &word(json), b"JSON", text] {
-        out.extend_from_slice(part);
-    }
-    out.resize(20 + json as usize, b' ');
+    let header = [&b"glTF"[..], &word(2), &word(bytes), &word(json), b"JSON"].concat();
+    let mut after = vec![b' '; json as usize - text.len()];
     if bin > 0 {
-        out.extend(word(bin));
-        out.extend(b"BIN\0");
-        fill(&mut out);
-        out.resize(bytes as usize, 0);
+        after.extend(word(bin));
+        after.extend(b"BIN\0");
     }
-    Ok(out)
+    Ok(vec![header.into(), text, after.into()])
+}
+
+pub(crate) fn length_of(pieces: &Pieces<'_>) -> usize {
+    pieces.iter().map(|piece| piece.len()).sum()
 }
 
 impl GltfDocument {
@@ -241,7 +278,7 @@ impl GltfDocument {
             return Some(Ok(packed.clone()));
         }
         let bin = self.buffers.first()?;
-        Some(write_chunks(self.text.as_deref()?, bin.len(), |out| out.extend_from_slice(bin)))
+        Some(join_chunks(self.text.as_deref()?.into(), bin))
     }
 }
 

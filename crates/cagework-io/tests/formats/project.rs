@@ -1,8 +1,11 @@
 //! Projects can be read again, and are plain GLBs for other programs.
 
+use std::borrow::Cow;
+
 use cagework_core::{PolygonMesh, subdivided_box};
 use cagework_io::{
-    Look, Model, ModelFormat, Project, ProjectError, UpAxis, read_project, write_cage_obj, write_project,
+    Look, Model, ModelFormat, Project, ProjectError, UpAxis, WriteError, read_project, write_cage_obj,
+    write_project, write_project_in_pieces,
 };
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -88,6 +91,26 @@ fn several_models_keep_their_order() {
     let again: Vec<&Model> = project.models.iter().collect();
     let twice = write_project(&again, &cage, &poses(&cage), SETTINGS).unwrap();
     assert!(twice.len() <= once.len() + 64, "{} then {}", once.len(), twice.len());
+}
+
+#[test]
+fn projects_above_a_limit_are_refused() {
+    let models = models();
+    let all: Vec<&Model> = models.iter().collect();
+    let cage = PolygonMesh::default();
+    let within = |models: &[&Model], limit| {
+        let mut written = None;
+        let mut write = |pieces: &[Cow<'_, [u8]>]| written = Some(pieces.concat());
+        write_project_in_pieces(models, &cage, &[], "{}", limit, &mut write)?;
+        Ok(written)
+    };
+    let whole = write_project(&all, &cage, &[], "{}").unwrap();
+    let bytes = whole.len() as u64;
+    assert_eq!(within(&all, bytes), Ok(Some(whole)));
+    assert_eq!(within(&all, bytes - 1), Err(WriteError::Limit { bytes, limit: bytes - 1 }));
+    // Eight vertices and six faces have at least 12 and 6 bytes each in the visible mesh.
+    let cube = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
+    assert_eq!(within(&[&cube], 131), Err(WriteError::Limit { bytes: 8 * 12 + 6 * 6, limit: 131 }));
 }
 
 /// Cage and poses are stored relative to the models' origin, and a node places the cage for other programs.

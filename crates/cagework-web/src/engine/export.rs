@@ -1,9 +1,11 @@
 //! Methods that write files and return arrays of the models.
 
+use std::borrow::Cow;
+
 use cagework_cage::CageOptions;
 use cagework_editor::{BoundError, Exported, SharedClip};
 use cagework_io::write_zip;
-use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
+use js_sys::{Array, Float32Array, Function, Uint8Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -11,7 +13,7 @@ use super::Engine;
 use crate::arrays::flat;
 use crate::cage::RigArrays;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{READ_LIMIT, decode};
+use crate::options::{KEPT_LIMIT, KEPT_PIECE, READ_LIMIT, decode};
 use crate::state::State;
 use crate::views::object;
 
@@ -144,6 +146,29 @@ impl Engine {
     #[wasm_bindgen(js_name = writeProject)]
     pub fn write_project(&self, settings: &str) -> Answer<Vec<u8>> {
         self.read(|state| Ok(state.editor.write_project(settings)?))
+    }
+
+    /// Writes the project file that the page keeps while the user works. `push` is called with each piece of at most
+    /// 8 MiB as a Uint8Array, so that wasm and JavaScript never hold the whole file.
+    ///
+    /// # Errors
+    /// If no model is open, or named `TooLarge` if the file would take more than 200 MiB.
+    #[wasm_bindgen(js_name = writeKept)]
+    pub fn write_kept(&self, settings: &str, push: &Function) -> Answer<()> {
+        let mut write = |pieces: &[Cow<'_, [u8]>]| {
+            // The function of the page only collects what it is given.
+            let copy = |bytes: &[u8]| drop(push.call1(&JsValue::NULL, &Uint8Array::from(bytes)));
+            let mut next = Vec::new();
+            for piece in pieces.iter().flat_map(|piece| piece.chunks(KEPT_PIECE)) {
+                if next.len() + piece.len() > KEPT_PIECE {
+                    copy(&next);
+                    next.clear();
+                }
+                next.extend_from_slice(piece);
+            }
+            copy(&next);
+        };
+        self.read(|state| Ok(state.editor.write_project_in_pieces(settings, KEPT_LIMIT, &mut write)?))
     }
 
     /// Up axis of the models' files.

@@ -637,7 +637,7 @@ export type Element = "vertex" | "edge" | "face";
 /**
  * Kinds of errors that the page handles differently.
  */
-export type ErrorName = "Cancelled" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
+export type ErrorName = "Cancelled" | "Format" | "TooLarge" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
 /**
  * What happens to planted feet in clips.
  */

@@ -16,31 +16,43 @@ const CHUNK = 1 << 23;
 export interface Bytes {
   readonly name: string;
   readonly content: Blob;
-  /** The siblings, by name and by path relative to the model's folder. */
-  readonly siblings: ReadonlyMap<string, Uint8Array>;
+  /** Functions that read the siblings, by name and by path relative to the model's folder. */
+  readonly siblings: ReadonlyMap<string, () => Uint8Array>;
 }
 
 /** Returns a function that finds a sibling by the path in the model's file, or else by the file name in that path. */
 export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8Array | undefined {
   return (path) => {
     const plain = path.replace(/^(\.\/)+/, "");
-    return siblings.get(plain) ?? siblings.get(plain.slice(plain.lastIndexOf("/") + 1));
+    return (siblings.get(plain) ?? siblings.get(plain.slice(plain.lastIndexOf("/") + 1)))?.();
   };
 }
 
 export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   const main = files.find(({ name }) => isModel(name)) ?? files[0];
   if (!main) throw named("Empty", "there is no file to open");
-  const siblings = new Map<string, Uint8Array>();
+  const siblings = new Map<string, () => Uint8Array>();
   if ((NAMING_ENDINGS as readonly string[]).includes(extension(main.name))) {
     const folder = main.path.slice(0, main.path.lastIndexOf("/") + 1);
     for (const file of files.filter((file) => file !== main)) {
-      const content = await read(file.name, file.file);
+      const content = await reader(file);
       siblings.set(file.name, content);
       if (file.path.startsWith(folder)) siblings.set(file.path.slice(folder.length), content);
     }
   }
   return { name: main.name, content: main.file, siblings };
+}
+
+/**
+ * Returns a function that reads a file. In a browser's worker it reads when it is called, because a model may not use
+ * all files that were dropped with it. Node has no synchronous read of a Blob, and the bytes of its files are in memory.
+ */
+async function reader({ name, file }: NamedFile): Promise<() => Uint8Array> {
+  if (typeof FileReaderSync === "undefined") {
+    const content = await read(name, file);
+    return () => content;
+  }
+  return () => new Uint8Array(new FileReaderSync().readAsArrayBuffer(file));
 }
 
 /** Creates an error for the first file above the size limit; undefined if there is none. */

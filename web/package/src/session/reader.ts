@@ -18,11 +18,14 @@ type SeparateRun = <K extends "read" | "readCage" | "check" | "repair" | "copyRi
 /** Function that runs one job at a time, each in a new worker that is closed afterwards. */
 export type SeparateWorkers = SeparateRun & {
   /**
-   * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for
-   * many small files.
+   * Until the returned function is called, successful jobs on small files pass their worker on to the next one, which
+   * is faster for many files.
    */
   share(): () => void;
 };
+
+/** Most bytes of files after which a worker is used again. The memory of a wasm module never shrinks. */
+const SMALL_BYTES = 1 << 24;
 
 /**
  * Runs jobs on untrusted files in workers of their own, so that a crash affects only that worker, and closing the
@@ -39,9 +42,10 @@ export function createSeparateWorkers(open: () => Client): SeparateWorkers {
     const client = idle ?? open();
     running = client;
     idle = undefined;
+    const bytes = "files" in input ? input.files.reduce((sum, { file }) => sum + file.size, 0) : 0;
     const end = (isGood: boolean) => {
       if (running === client) running = undefined;
-      if (isGood && isShared && !idle) idle = client;
+      if (isGood && isShared && !idle && bytes <= SMALL_BYTES) idle = client;
       else client.close();
     };
     const what =

@@ -1,7 +1,5 @@
 /** Text about work kept in the browser. */
 
-import { bytes } from "../../format";
-
 const SAVE_ADVICE = "Save a project file (step Export) before you close the page.";
 
 export const works = {
@@ -19,8 +17,8 @@ export const works = {
   show: "Show kept work",
   full: (name: string) => `This browser has no room left to keep your work on ${name}. ${SAVE_ADVICE}`,
   forbidden: `This browser does not let the page keep your work. ${SAVE_ADVICE}`,
-  large: (name: string, size: number, most: number) =>
-    `Your work on ${name} is too large to keep automatically (${bytes(size)}; the limit is ${bytes(most)}). ${SAVE_ADVICE}`,
+  large: (name: string, reason: string) =>
+    `Your work on ${name} is not kept automatically: ${reason}. ${SAVE_ADVICE}`,
   damaged: "Some of the work kept in this browser was damaged and has been deleted.",
   damagedOf: (name: string) =>
     `Your work on ${name}, kept in this browser, was damaged and has been deleted.`,
