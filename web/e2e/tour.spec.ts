@@ -89,6 +89,18 @@ test("a link starts the tour, keys and touch navigate, binds are compared, and t
     await expect(card(page).getByRole("img")).toHaveCount(3);
     await shoot(page, "tour-splat-phone");
   });
+  await test.step("the first steps leave room for the panel and the timeline", async () => {
+    await page.evaluate(() => {
+      location.hash = "first-steps=3";
+    });
+    await expect(card(page)).toContainText("3 of 5");
+    await expect(card(page)).toHaveAttribute("aria-busy", "false", { timeout: 60_000 });
+    await page.getByRole("button", { name: "Save pose" }).tap();
+    await expect(page.getByRole("region", { name: "Timeline" })).toContainText("My poses (3)");
+    await card(page).getByRole("button", { name: "Next" }).tap();
+    await expect(card(page)).toContainText("4 of 5");
+    await expect(card(page)).toHaveAttribute("aria-busy", "false", { timeout: 60_000 });
+  });
   await card(page).getByRole("button", { name: "Leave the tour" }).tap();
   await expect(page).toHaveTitle(/own/);
   await bound(page);

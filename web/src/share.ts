@@ -1,6 +1,7 @@
-/** Links: sample, pose and view, or a stop of the tour, in the URL's fragment, which browsers do not send to servers. */
+/** Links: sample, pose and view, or a stop of a tour, in the URL's fragment, which browsers do not send to servers. */
 
 import type { CageControls, CameraView, SceneOptions } from "./contract";
+import type { TourPlace } from "./state";
 import { PageError } from "./strings";
 import { T } from "./words";
 
@@ -118,11 +119,18 @@ export function fromBase64Url(text: string): Uint8Array {
   return Uint8Array.from(binary, (letter) => letter.charCodeAt(0));
 }
 
-/** Returns the stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
-export function stopOf(fragment: string): number | undefined {
-  const said = new URLSearchParams(fragment.slice(1)).get("tour");
-  return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);
+/** Names of the tours in links. */
+const TOUR_KEYS = { first: "first-steps", how: "tour" } as const;
+
+/** Returns the stop of a tour that the fragment of an address names; undefined if it names none. */
+export function stopOf(fragment: string): TourPlace | undefined {
+  const parameters = new URLSearchParams(fragment.slice(1));
+  for (const name of ["first", "how"] as const) {
+    const said = parameters.get(TOUR_KEYS[name]);
+    if (said !== null) return { name, stop: Math.max(0, (Number.parseInt(said, 10) || 1) - 1) };
+  }
+  return undefined;
 }
 
-/** Returns the fragment of a link to a stop of the tour, counted from 0. */
-export const linkOf = (stop: number): string => `#tour=${stop + 1}`;
+/** Returns the fragment of a link to a stop of a tour. */
+export const linkOf = ({ name, stop }: TourPlace): string => `#${TOUR_KEYS[name]}=${stop + 1}`;

@@ -218,10 +218,18 @@ export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: App
   return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };
 }
 
-/** Current stop of the tour, and its binds. */
-export interface TourState {
+/** The tours: first steps with a model, and how the method works. */
+export type TourName = "first" | "how";
+
+/** A stop of a tour. */
+export interface TourPlace {
+  readonly name: TourName;
   /** Index of the stop, from 0. */
   readonly stop: number;
+}
+
+/** Current stop of a tour, and its binds. */
+export interface TourState extends TourPlace {
   /** Reports of this stop's binds, in order. */
   readonly reports: readonly BindReport[];
   /**

@@ -58,13 +58,13 @@ export function markSeen(notice: string): void {
   writeItem(SEEN_PREFIX + notice, "yes");
 }
 
-/** Reads the stop at which the user left the tour, from 0. */
-export function loadStop(): number {
-  return Number(readItem(TOUR)) || 0;
+/** Reads the link to the stop at which the user left the tour. */
+export function loadStop(): string {
+  return readItem(TOUR) ?? "";
 }
 
-export function saveStop(stop: number): void {
-  writeItem(TOUR, String(stop));
+export function saveStop(link: string): void {
+  writeItem(TOUR, link);
 }
 
 function writeItem(key: string, value: string): void {

@@ -38,6 +38,11 @@ declare global {
 type Patch = Partial<AppState>;
 
 // Made-up names contain no letters, so that `inspect` does not report them as untranslated.
+/** The stops of both tours. */
+const TOUR_PLACES = (["first", "how"] as const).flatMap((name) =>
+  STOPS[name].map((_, stop) => ({ name, stop })),
+);
+
 const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
 const MEMBER = {
   ...memberOf(0, "01", 1234),
@@ -422,11 +427,12 @@ async function start(): Promise<void> {
       },
     ] as const,
     ...DIALOGS.map((patch, k) => [`dialog ${k}`, () => visit(patch)] as const),
-    ...STOPS.map((name, stop) => {
-      const { binds, step } = stopsOf(true)[name];
-      const tour = { stop, reports: binds.map(reportBy), doing: null };
+    ...TOUR_PLACES.map((place) => {
+      const stopName = STOPS[place.name][place.stop] ?? "pull";
+      const { binds, step } = stopsOf(true)[stopName];
+      const tour = { ...place, reports: binds.map(reportBy), doing: null };
       return [
-        `stop ${name}`,
+        `stop ${stopName}`,
         async () => {
           await tourLoaded();
           await visit({ step, tour });
@@ -437,7 +443,7 @@ async function start(): Promise<void> {
   globalThis.visits = visits;
   /** Loads the tour. Does not await `start`, which waits for a sample that the fake session never opens. */
   const tourLoaded = async () => {
-    if (!app.tour.loaded()) void app.tour.start(0);
+    if (!app.tour.loaded()) void app.tour.start();
     while (!app.tour.loaded()) await new Promise((done) => setTimeout(done));
   };
 
@@ -458,9 +464,9 @@ async function start(): Promise<void> {
       await visit();
       await look(name);
     }
-    for (const stop of STOPS.keys()) {
-      show({ tour: { stop, reports: [], doing: [2, 3] } });
-      await look(`stop ${stop}, binding`);
+    for (const place of TOUR_PLACES) {
+      show({ tour: { ...place, reports: [], doing: [2, 3] } });
+      await look(`stop ${place.stop} of ${place.name}, binding`);
     }
     show({});
 

@@ -1,6 +1,7 @@
 /** Starts the tour, whose code is downloaded at the first start. */
 
 import { loadPart } from "@cagework/core/session/parts";
+import type { TourPlace } from "../state";
 import type { Guide, GuideNeeds } from "../tour";
 import { loadTour, T } from "../words";
 import { attempt, type Context } from "./context";
@@ -9,12 +10,12 @@ export function createTour(ctx: Context, needs: GuideNeeds) {
   /** The guide of the tour, and the component that draws its card. */
   let loaded: { readonly guide: Guide; readonly Card: typeof import("../tour").Card } | undefined;
   return {
-    /** Starts the tour at a stop, counted from 0, by default where the user left it. */
-    async start(stop?: number) {
+    /** Starts a tour at a stop, by default where the user left it. */
+    async start(place?: TourPlace) {
       await attempt(ctx, T.failed.tour, async () => {
         const [{ Card, createGuide }] = await loadPart(Promise.all([import("../tour"), loadTour()]));
         loaded ??= { guide: createGuide(ctx, needs), Card };
-        await loaded.guide.start(stop);
+        await loaded.guide.start(place);
       });
     },
     /** The downloaded code of the tour; undefined before the first start. */

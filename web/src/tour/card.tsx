@@ -4,29 +4,43 @@ import { useLayoutEffect, useRef } from "preact/hooks";
 import { copyLink } from "../actions/exports";
 import type { App } from "../app";
 import type { TourState } from "../state";
-import { Button, IconButton } from "../ui/controls";
+import { Button, IconButton, Segments } from "../ui/controls";
 import { T, TOUR } from "../words";
 import { TourFigure } from "./figures";
 import type { Guide } from "./guide";
 import { STOPS, type StopName } from "./stops";
 
 export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: Guide }) {
-  const { stop, reports, doing } = tour;
+  const { name: tourName, stop, reports, doing } = tour;
+  const stops = STOPS[tourName];
   const card = useRef<HTMLElement>(null);
   useLayoutEffect(() => {
     // Focus the main button, so that the tour can continue by keyboard.
     card.current?.querySelector<HTMLElement>(".primary")?.focus();
   }, []);
-  const name: StopName = STOPS[stop] ?? "cage";
-  const { title, claim, task } = TOUR.stops[name];
+  const name: StopName = stops[stop] ?? "pull";
+  const { title, claim, task, alone } = TOUR.stops[name];
   const go = (to: number) => void guide.go(to);
-  const isLast = stop === STOPS.length - 1;
+  const isLast = stop === stops.length - 1;
   return (
-    <section class="tour" aria-label={TOUR.name} aria-busy={doing !== null} ref={card}>
+    <section
+      class={`tour tour-${tourName}${isLast ? " tour-last" : ""}`}
+      aria-label={TOUR.name}
+      aria-busy={doing !== null}
+      ref={card}
+    >
       <div class="tour-head">
-        <span class="tour-count">{TOUR.of(stop + 1, STOPS.length)}</span>
+        <Segments
+          label={TOUR.name}
+          hideLabel
+          values={["first", "how"]}
+          labels={TOUR.names}
+          value={tourName}
+          onChange={(other) => void guide.go(0, other)}
+        />
+        <span class="tour-count">{TOUR.of(stop + 1, stops.length)}</span>
         <h2>{title}</h2>
-        <Stops now={stop} go={go} />
+        <Stops stops={stops} now={stop} go={go} />
         <div class="tour-ways">
           <Button label={TOUR.back} onClick={() => go(stop - 1)} disabled={stop === 0} />
           <Button
@@ -51,9 +65,12 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
       </div>
       <div class="tour-body">
         <div class="tour-text" aria-live="polite">
-          <p>{claim(reports)}</p>
+          <p class="claim">{claim(reports)}</p>
           <p class="task">
             <strong>{TOUR.task}</strong> {task}
+          </p>
+          <p class="task alone">
+            <strong>{TOUR.alone}</strong> {alone}
           </p>
           {doing && doing[0] > 0 && <p class="hint">{TOUR.doing(...doing)}</p>}
         </div>
@@ -64,10 +81,10 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
 }
 
 /** Buttons for all stops, drawn as dots. */
-function Stops({ now, go }: { now: number; go: (stop: number) => void }) {
+function Stops({ stops, now, go }: { stops: readonly StopName[]; now: number; go: (stop: number) => void }) {
   return (
     <nav class="tour-stops" aria-label={TOUR.all}>
-      {STOPS.map((name, k) => (
+      {stops.map((name, k) => (
         <button
           key={name}
           type="button"

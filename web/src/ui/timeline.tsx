@@ -20,7 +20,8 @@ const ROOM = 0.15;
 export function hasTimeline(state: AppState): boolean {
   const { step, model, walk, editingRest, bound, tour } = state;
   const hasMotion = (model?.clips.length ?? 0) > 0 || walk !== null || fittingPoses(state).length > 1;
-  return hasMotion && bound && !editingRest && tour === null && (step === "pose" || step === "export");
+  const isWanted = tour === null || tour.name === "first";
+  return hasMotion && bound && !editingRest && isWanted && (step === "pose" || step === "export");
 }
 
 export function Timeline({ app }: { app: App }) {

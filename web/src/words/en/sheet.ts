@@ -40,7 +40,7 @@ const commands: { readonly [command in Command]?: string } = {
   toggleWire: "The model at rest, as wireframe",
   heatMap: "Weight of the selected handle",
   see: "The See panel",
-  tour: "The tour, eleven stops",
+  tour: "The tours: first steps, and how it works",
   nextStop: "Next or previous stop of the tour",
   restMode: "Edit the cage, or pose",
   split: "Split an edge",
