@@ -3,7 +3,7 @@
 import { startBind } from "@cagework/core/session/bind";
 import { type Client, createClient } from "@cagework/core/session/client";
 import { createFrames } from "@cagework/core/session/frames";
-import { chain } from "@cagework/core/session/jobs";
+import { chain, pageTurn } from "@cagework/core/session/jobs";
 import type { Held, ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenResult, openOn } from "@cagework/core/session/open";
 import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
@@ -183,6 +183,8 @@ async function start(opened: OpenResult & Needs) {
     const cage = read.cage?.positions.length ? read.cage : undefined;
     const notices = await engine.open(models, { sample, settings, cage: cage ?? null, poses });
     const info = engine.modelInfo();
+    // The page then collects the shapes that the cage encloses, which takes as long.
+    await pageTurn();
     const model = {
       ...info,
       name: T.models.several(info.name, info.members.length - 1),
