@@ -3,7 +3,7 @@
 import { startBind } from "@cagework/core/session/bind";
 import { type Client, createClient } from "@cagework/core/session/client";
 import { createFrames } from "@cagework/core/session/frames";
-import { chain } from "@cagework/core/session/jobs";
+import { chain, pageTurn } from "@cagework/core/session/jobs";
 import type { Held, ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenResult, openOn } from "@cagework/core/session/open";
 import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
@@ -177,12 +177,14 @@ async function start(opened: OpenResult & Needs) {
     sample: string | null,
     poses: OpenContents["poses"] = [],
   ): Promise<OpenedFile> {
-    const models = load(pkg, read);
+    const models = await load(pkg, read);
     const settings = models[0].settings ?? null;
     // A project that was saved without a cage contains an empty cage.
     const cage = read.cage?.positions.length ? read.cage : undefined;
     const notices = await engine.open(models, { sample, settings, cage: cage ?? null, poses });
     const info = engine.modelInfo();
+    // The page then collects the shapes that the cage encloses, which takes as long.
+    await pageTurn();
     const model = {
       ...info,
       name: T.models.several(info.name, info.members.length - 1),
@@ -225,12 +227,12 @@ async function start(opened: OpenResult & Needs) {
     add(reads: readonly ReadFile[], label?: (models: number) => string): Job<readonly string[]> {
       let isGivenUp = false;
       const work = async () => {
-        const all: ReturnType<typeof load>[number][] = [];
+        const all: Awaited<ReturnType<typeof load>>[number][] = [];
         try {
           for (const read of reads) {
             if (isGivenUp) throw cancelled();
             // If the file is a project, add its models and ignore its cage.
-            all.push(...load(pkg, read as ReadModel));
+            all.push(...(await load(pkg, read as ReadModel)));
           }
         } catch (error) {
           for (const loaded of all) loaded.free();
@@ -247,8 +249,8 @@ async function start(opened: OpenResult & Needs) {
       };
     },
     /** Fits a humanoid rig with clips to the open models, so that the cage can follow them. */
-    openWalk(read: ReadFile): WalkInfo {
-      const all = load(pkg, read as ReadModel);
+    async openWalk(read: ReadFile): Promise<WalkInfo> {
+      const all = await load(pkg, read as ReadModel);
       try {
         return engine.openWalk(all[0]);
       } finally {
@@ -263,7 +265,7 @@ async function start(opened: OpenResult & Needs) {
       const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];
       const job = reading("copyRig", { clothes, body: from, held: held(id) }, hear);
       return chain(ofNow(job), async (read) => {
-        const [loaded] = load(pkg, read);
+        const [loaded] = await load(pkg, read);
         await engine.replace(id, loaded, label);
         return { report: read.report };
       });

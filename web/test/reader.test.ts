@@ -1,6 +1,7 @@
+import type { Package } from "@cagework/core/session/artifact";
 import { type Client, named } from "@cagework/core/session/client";
 import { readFiles, siblingOf } from "@cagework/core/session/files";
-import { createSeparateWorkers } from "@cagework/core/session/reader";
+import { createSeparateWorkers, load } from "@cagework/core/session/reader";
 import { expect, it, vi } from "vitest";
 import type { NamedFile } from "../src/contract";
 import { T } from "../src/words";
@@ -129,4 +130,34 @@ it("in a browser's worker, a sibling file is read when the model asks for it", a
   const find = siblingOf((await readFiles([file("fox.obj"), used, unused])).siblings);
   expect([find("fur.png")?.length, asked]).toEqual([3, [used.file]]);
   vi.unstubAllGlobals();
+});
+
+it("each model and each texture is copied in a task of its own", async () => {
+  const events: string[] = [];
+  vi.stubGlobal(
+    "MessageChannel",
+    class extends MessageChannel {
+      constructor() {
+        super();
+        events.push("turn");
+      }
+    },
+  );
+  const restore = () => {
+    events.push("model");
+    return { setTexture: (index: number) => events.push(`texture ${index}`) };
+  };
+  const texture = { width: 1, height: 1, rgba: new Uint8Array(4) };
+  const read = {
+    models: [[], []],
+    textures: [[texture, null, texture], []],
+    held: { pixels: 2, bytes: 0 },
+    cage: undefined,
+    notices: [],
+    vertices: 0,
+  };
+  const all = await load({ LoadedModel: { restore } } as unknown as Package, read);
+  vi.unstubAllGlobals();
+  expect(all.length).toBe(2);
+  expect(events).toEqual(["turn", "model", "turn", "texture 0", "turn", "texture 2", "turn", "model"]);
 });

@@ -39,7 +39,7 @@ export function createWalk(ctx: Context, edit: Pick<Edit, "settle">, player: Pla
         try {
           const [rig] = await readModels(ctx, signal, [files], "add");
           if (!rig) return;
-          const { clips, notice } = ctx.session().openWalk(rig.read);
+          const { clips, notice } = await ctx.session().openWalk(rig.read);
           store.set({ walk: { clips, clip: 0, name: rig.name }, moment: 0 });
           if (notice !== null) ctx.tell.say(sentence(notice));
         } finally {

@@ -48,6 +48,12 @@ impl Mesh {
         model: &DrawModel,
         normals: &[[f32; 4]],
     ) -> Result<Self, GpuError> {
+        let white = DrawTexture { width: 1, height: 1, rgba: vec![255; 4], ..DrawTexture::default() };
+        let white = texture::upload(context, &white).await?;
+        let mut textures = Vec::new();
+        for texture in &model.textures {
+            textures.push(texture::upload(context, texture).await?);
+        }
         let mut allocator = Allocator::new(context, "the model");
         let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
         let corner_bytes: &[u8] = bytemuck::cast_slice(&model.vertices);
@@ -68,15 +74,6 @@ impl Mesh {
         let rest_normals = Table::new(context, &mut allocator, "rest normals", Entry::Point, n)?;
         rest_normals.write(context, bytemuck::cast_slice(normals));
         let values = Table::new(context, &mut allocator, "values of vertices", Entry::Value, n)?;
-        let white = texture::upload(
-            context,
-            &mut allocator,
-            &DrawTexture { width: 1, height: 1, rgba: vec![255; 4], ..DrawTexture::default() },
-        );
-        let mut textures = Vec::new();
-        for texture in &model.textures {
-            textures.push(texture::upload(context, &mut allocator, texture));
-        }
         let mut groups = Vec::new();
         for group in model.whole_groups(CLAY) {
             let (view, wrap) = match group.texture {

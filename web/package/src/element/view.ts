@@ -97,7 +97,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     const { name, file, vertices, grid, bound } = wanted;
     hear("Opening", 0);
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
-    await engine.open(load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
+    await engine.open(await load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
     engine.frameAll();
     let cage = wanted.cage ? arraysOf(wanted.cage, engine.origin()) : read.cage;
     if (!cage) {

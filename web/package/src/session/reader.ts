@@ -5,6 +5,7 @@ import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Client, named } from "./client";
 import { tooLarge } from "./files";
+import { pageTurn } from "./jobs";
 import type { Jobs, ReadModel } from "./messages";
 
 export type ReadListener = ((progress: Reading) => void) | undefined;
@@ -82,16 +83,21 @@ export function createSeparateWorkers(open: () => Client): SeparateWorkers {
 
 /**
  * Restores the models that a worker has read: the first, then the others of a project. Removes the models' arrays from
- * `read`, so that their memory can be freed.
+ * `read`, so that their memory can be freed. Each model and each texture is copied in a task of its own.
  */
-export function load(pkg: Package, read: ReadModel): [LoadedModel, ...LoadedModel[]] {
-  const [first, ...others] = read.models.splice(0).map((arrays, number) => {
+export async function load(pkg: Package, read: ReadModel): Promise<[LoadedModel, ...LoadedModel[]]> {
+  const all: LoadedModel[] = [];
+  for (const [number, arrays] of read.models.splice(0).entries()) {
+    await pageTurn();
     const loaded = pkg.LoadedModel.restore(arrays);
-    read.textures[number]?.forEach((texture, k) => {
-      if (texture) loaded.setTexture(k, texture.width, texture.height, texture.rgba);
-    });
-    return loaded;
-  });
+    all.push(loaded);
+    for (const [k, texture] of read.textures[number]?.entries() ?? []) {
+      if (!texture) continue;
+      await pageTurn();
+      loaded.setTexture(k, texture.width, texture.height, texture.rgba);
+    }
+  }
+  const [first, ...others] = all;
   if (!first) throw new Error("a file that was read can be opened once");
   return [first, ...others];
 }
