@@ -571,8 +571,10 @@ impl Member {
 
     fn states(&self, clip: Option<&str>) -> Result<Cow<'_, (Vec<Vec3>, Vec<[u32; 3]>)>, UnknownClip> {
         match clip {
-            Some(_) => self.model.states(clip).map(Cow::Owned),
-            None => known(&self.known.states, || self.model.states(None)).map(Cow::Borrowed),
+            None if self.model.is_rigged() => {
+                known(&self.known.states, || self.model.states(None)).map(Cow::Borrowed)
+            }
+            _ => self.model.states(clip).map(Cow::Owned),
         }
     }
 
