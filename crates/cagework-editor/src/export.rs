@@ -140,7 +140,7 @@ impl BoundDocument<'_> {
         self.require_mesh()?;
         let mut rows = self.rows(id, self.require_bound()?)?;
         rows.weights.append(&rows.rig);
-        let points = self.document().models.get(id)?.model.extra_points()?;
+        let points = self.document().models.get(id)?.extra_points()?;
         let inner = self.document().cage.inner_positions();
         Ok(write_weights_npz(&rows.weights, rows.frames, &rows.outside, &points, inner))
     }

@@ -39,14 +39,14 @@ impl JointDots {
         let (mut joints, mut of_joints, mut points) = (Vec::new(), Vec::new(), Vec::new());
         for member in models.iter() {
             let (first_joint, first_point) = (joints.len(), points.len());
-            let own = member.model.joints()?;
+            let own = member.joints()?;
             of_joints.extend(vec![member.id; own.len()]);
-            joints.extend(own.into_iter().map(|joint| JointPoint {
+            joints.extend(own.iter().map(|&joint| JointPoint {
                 point: first_point + joint.point,
                 parent: joint.parent.map(|parent| first_joint + parent),
                 ..joint
             }));
-            points.extend(member.model.extra_points()?);
+            points.extend_from_slice(member.extra_points()?);
         }
         let rows: Vec<u32> = joints.iter().map(|joint| joint.point as u32).collect();
         Ok(Self {

@@ -7,12 +7,12 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use cagework_core::TriMesh;
 use cagework_core::rig::Rig;
 use cagework_core::splats::Splats;
-use cagework_io::{Clip, Model, UnknownClip, UpAxis};
+use cagework_io::{Clip, JointPoint, Model, UnknownClip, UpAxis, WriteError};
 use cagework_pose::Parts;
 use cagework_pose::humanoid::Bone;
 use glam::{DVec3, Vec3};
@@ -75,10 +75,29 @@ pub struct Member {
     points: Option<Arc<Splats>>,
     /// Surface mesh that represents a capture of splats or a point cloud, for picking and pulling.
     stand_in: Option<Arc<TriMesh>>,
+    known: Arc<KnownRig>,
     /// Range of vertices in the joined mesh.
     pub vertices: Range<usize>,
     /// Range of triangles in the joined mesh.
     pub triangles: Range<usize>,
+}
+
+/// What is read from the rig of a model, once: reading decodes all morph targets.
+#[derive(Debug, Default)]
+struct KnownRig {
+    extra_points: OnceLock<Vec<Vec3>>,
+    joints: OnceLock<Vec<JointPoint>>,
+    states: OnceLock<(Vec<Vec3>, Vec<[u32; 3]>)>,
+    /// `None` without joints, or if they cannot be read.
+    rest: OnceLock<Option<Rig>>,
+}
+
+/// The value of `cell`, computed if it is empty.
+fn known<T, E>(cell: &OnceLock<T>, read: impl FnOnce() -> Result<T, E>) -> Result<&T, E> {
+    match cell.get() {
+        Some(value) => Ok(value),
+        None => read().map(|value| cell.get_or_init(|| value)),
+    }
 }
 
 /// Compares name and geometry of the file, the number of the first triangle, the options, and [`Member::painted`].
@@ -149,6 +168,7 @@ impl Models {
             first_triangle,
             points,
             stand_in,
+            known: Arc::default(),
             vertices: 0..0,
             triangles: 0..0,
             model: Arc::new(model),
@@ -401,7 +421,7 @@ impl Models {
     pub fn extra_points(&self) -> Result<Vec<Vec3>, EditError> {
         let mut points = Vec::new();
         for member in self.iter() {
-            points.extend(member.model.extra_points()?);
+            points.extend_from_slice(member.extra_points()?);
         }
         Ok(points)
     }
@@ -413,7 +433,7 @@ impl Models {
     pub fn extra_of(&self, id: u32) -> Result<Range<usize>, EditError> {
         let mut first = 0;
         for member in self.iter() {
-            let n = member.model.extra_points()?.len();
+            let n = member.extra_points()?.len();
             if member.id == id {
                 return Ok(first..first + n);
             }
@@ -432,10 +452,10 @@ impl Models {
         for member in self.iter() {
             // Models without this clip contribute no frames. They stay at rest, or follow the joints of one with it.
             let has = |name: &&str| self.len() == 1 || Clip::named(&member.model.clips(), name).is_ok();
-            let (own, corners) = member.model.states(clip.filter(has))?;
+            let own = member.states(clip.filter(has))?;
             let first = positions.len() as u32;
-            triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
-            positions.extend(own);
+            triangles.extend(own.1.iter().map(|t| t.map(|v| first + v)));
+            positions.extend_from_slice(&own.0);
         }
         Ok((positions, triangles))
     }
@@ -444,20 +464,20 @@ impl Models {
     /// Joints of the same name are one. `None` without joints, or if they cannot be read.
     #[must_use]
     pub fn rest_rig(&self) -> Option<Rig> {
-        self.rig_of(|model| Some(model.states(None).ok()?.0.len()))
+        self.rig_of(|member| Some(member.states(None).ok()?.0.len()))
     }
 
     /// Like [`Self::rest_rig`], with the influences on [`Self::positions`].
     pub(crate) fn vertex_rig(&self) -> Option<Rig> {
-        self.rig_of(|model| Some(model.positions.len()))
+        self.rig_of(|member| Some(member.model.positions.len()))
     }
 
     /// The joined rig of the models. `n_points`: number of points of a model, its vertices first.
-    fn rig_of(&self, n_points: impl Fn(&Model) -> Option<usize>) -> Option<Rig> {
+    fn rig_of(&self, n_points: impl Fn(&Member) -> Option<usize>) -> Option<Rig> {
         let mut all = Rig::default();
         for member in self.iter() {
-            let rig = member.model.rest_rig().ok().flatten();
-            all.append(rig.as_ref(), n_points(&member.model)?);
+            let rig = member.known.rest.get_or_init(|| member.model.rest_rig().ok().flatten());
+            all.append(rig.as_ref(), n_points(member)?);
         }
         Some(all).filter(|rig| !rig.joints.is_empty())
     }
@@ -535,6 +555,27 @@ impl Member {
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         self.stand_in.as_ref().map_or(&self.model.triangles, |mesh| &mesh.triangles)
+    }
+
+    /// [`Model::extra_points`] of the model.
+    ///
+    /// # Errors
+    /// If a part of the rig cannot be read.
+    pub fn extra_points(&self) -> Result<&[Vec3], WriteError> {
+        known(&self.known.extra_points, || self.model.extra_points()).map(Vec::as_slice)
+    }
+
+    pub(crate) fn joints(&self) -> Result<&[JointPoint], WriteError> {
+        known(&self.known.joints, || self.model.joints()).map(Vec::as_slice)
+    }
+
+    fn states(&self, clip: Option<&str>) -> Result<Cow<'_, (Vec<Vec3>, Vec<[u32; 3]>)>, UnknownClip> {
+        match clip {
+            None if self.model.is_rigged() => {
+                known(&self.known.states, || self.model.states(None)).map(Cow::Borrowed)
+            }
+            _ => self.model.states(clip).map(Cow::Owned),
+        }
     }
 
     fn selects(&self, name: &str) -> bool {

@@ -39,8 +39,6 @@ pub(crate) struct State {
     pub(crate) editor: Editor,
     /// Draw data of each model, by id.
     pub(crate) draws: BTreeMap<u32, Arc<DrawModel>>,
-    /// Number of points of all rigs; computed on first use.
-    pub(crate) n_rig: Option<usize>,
     /// Id of the model in paint mode, and how much each vertex of all models stays in place, from 0 to 1.
     /// `[n_vertices]`
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
@@ -190,7 +188,6 @@ impl State {
             (self.bound, self.parts) = (None, None);
             self.editor.set_bind(None);
             if key.mesh != before.mesh {
-                self.n_rig = None;
                 self.painting = None;
             }
             self.fit_camera();

@@ -196,12 +196,8 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
     ) -> Answer<f64> {
         let request: PageBindOptions = decode(options)?;
-        if self.read(|state| state.n_rig.is_none()) {
-            let n = self.read(|state| Answer::Ok(state.models().extra_points()?.len()))?;
-            self.state.borrow_mut().n_rig = Some(n);
-        }
         self.read(|state| {
-            let n = state.models().positions().len() + state.n_rig.unwrap_or(0);
+            let n = state.models().positions().len() + state.models().extra_points()?.len();
             Ok(estimate_memory(state.require_set()?, n, &request.options)? as f64)
         })
     }
