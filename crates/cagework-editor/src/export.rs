@@ -142,7 +142,7 @@ impl BoundDocument<'_> {
         rows.weights.append(&rows.rig);
         let points = self.document().models.get(id)?.extra_points()?;
         let inner = self.document().cage.inner_positions();
-        Ok(write_weights_npz(&rows.weights, rows.frames, &rows.outside, &points, inner))
+        Ok(write_weights_npz(&rows.weights, rows.frames, &rows.outside, points, inner))
     }
 
     /// Rejects captures of splats and point clouds.

@@ -82,12 +82,15 @@ pub struct Member {
     pub triangles: Range<usize>,
 }
 
+/// Positions and triangles of a model in all its states ([`Model::states`]).
+type States = (Vec<Vec3>, Vec<[u32; 3]>);
+
 /// What is read from the rig of a model, once: reading decodes all morph targets.
 #[derive(Debug, Default)]
 struct KnownRig {
     extra_points: OnceLock<Vec<Vec3>>,
     joints: OnceLock<Vec<JointPoint>>,
-    states: OnceLock<(Vec<Vec3>, Vec<[u32; 3]>)>,
+    states: OnceLock<States>,
     /// `None` without joints, or if they cannot be read.
     rest: OnceLock<Option<Rig>>,
 }
@@ -569,7 +572,7 @@ impl Member {
         known(&self.known.joints, || self.model.joints()).map(Vec::as_slice)
     }
 
-    fn states(&self, clip: Option<&str>) -> Result<Cow<'_, (Vec<Vec3>, Vec<[u32; 3]>)>, UnknownClip> {
+    fn states(&self, clip: Option<&str>) -> Result<Cow<'_, States>, UnknownClip> {
         match clip {
             None if self.model.is_rigged() => {
                 known(&self.known.states, || self.model.states(None)).map(Cow::Borrowed)
