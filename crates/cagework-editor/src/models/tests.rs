@@ -39,6 +39,19 @@ fn names(models: &Models) -> Vec<&str> {
 }
 
 #[test]
+fn rigs_are_read_once() {
+    let mut models = three();
+    // As undo keeps them.
+    let copy = models.clone();
+    models.extra_points().unwrap();
+    let is_read =
+        |models: &Models| models.iter().map(|m| m.known.extra_points.get().is_some()).collect::<Vec<_>>();
+    assert_eq!((is_read(&models), is_read(&copy)), (vec![true; 3], vec![true; 3]));
+    models.replace(models.iter().next().unwrap().id, model("body.obj", 5.0)).unwrap();
+    assert_eq!(is_read(&models).iter().filter(|&&read| read).count(), 2, "the new body is read for itself");
+}
+
+#[test]
 fn surface_points_keep_their_triangle_when_models_change() {
     let mut models = three();
     let of_hat = 7;
