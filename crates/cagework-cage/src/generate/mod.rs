@@ -54,7 +54,7 @@ pub use options::{
     Symmetry, TARGET, VOXELS,
 };
 use quads::Faces;
-use shell::{Shell, Spacing};
+use shell::{Shell, Spacing, VoxelHull};
 use soup::Soup;
 use verify::{verify_faces, verify_surface};
 
@@ -232,13 +232,13 @@ fn generate_plain(
     let components = match (options.per_component, options.kind) {
         (true, kind) if kind != CageKind::Hull => {
             let of = (mirrors, narrow.handles);
-            let shell =
-                |n| Shell::new(positions, triangles, bounds, (n, narrow.stretch), of, options, &go_on);
+            let hull =
+                |n| VoxelHull::new(positions, triangles, bounds, (n, narrow.stretch), of, options, &go_on);
             let n_vertices = Cell::new(0);
             let parts = |n| {
-                let shell = shell(n)?;
-                n_vertices.set(n_vertices.get() + shell.hull.positions.len());
-                Ok((shell.separate, shell.hull.positions.len()))
+                let hull = hull(n)?;
+                n_vertices.set(n_vertices.get() + hull.n_vertices());
+                Ok((hull.separate, hull.n_vertices()))
             };
             let found = Components::find(parts, [base, affordable], target)?;
             effort.spend_on_hulls(n_vertices.get());
@@ -435,30 +435,35 @@ impl Model<'_> {
                 if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
             };
             let Soup { positions, triangles, .. } = self.soup;
-            let shell_of = |mirrors: Mirrors| -> Result<Shell, Cancellation> {
+            let hull_of = |mirrors: Mirrors| -> Result<VoxelHull, Cancellation> {
                 let of = (mirrors, if fills { self.narrow.handles } else { usize::MAX });
                 let voxelize = |share| go_on(Stage::Voxelize, 0.4 * share);
                 let lattice = (voxels, stretch);
-                let mut shell =
-                    Shell::new(positions, triangles, self.bounds, lattice, of, options, &voxelize)?;
-                self.effort.spend_on_hulls(shell.hull.positions.len());
+                let hull =
+                    VoxelHull::new(positions, triangles, self.bounds, lattice, of, options, &voxelize)?;
+                self.effort.spend_on_hulls(hull.n_vertices());
+                Ok(hull)
+            };
+            let shell_of = |hull: VoxelHull| {
+                let mut shell = hull.smoothed();
                 if self.narrow.keeps {
                     shell.find_gaps(&self.soup, [voxels, self.most_gaps]);
                 }
-                Ok(shell)
+                shell
             };
-            let shell = shell_of(mirrors)?;
+            let hull = hull_of(mirrors)?;
             // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
             // lattice closes them.
             let may_coarsen = attempt < MAX_LATTICES && voxels > least;
             let may_shrink = attempt < n_lattices && may_coarsen;
-            let n_half = shell.hull.positions.len();
+            let n_half = hull.n_vertices();
             let max_hull = if options.voxels == 0 { MAX_HULL } else { MAX_FINE_HULL };
             if voxels > base && may_shrink && n_half > max_hull {
                 let shrunk = voxels as f64 * (0.9 * max_hull as f64 / n_half as f64).sqrt();
                 voxels = (shrunk as usize).max(base).max(least);
                 continue;
             }
+            let shell = shell_of(hull);
             let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
             let (mut cage, hull) = match simplify_hull(&shell, options, may_coarsen, self.effort, &simplify) {
                 Ok(Simplification::Cage(cage, hull)) => (*cage, hull),
@@ -478,7 +483,7 @@ impl Model<'_> {
             let mut shell = shell;
             if mirrors.len() > 1 && cage.n_vertices() > MIN_TARGET as usize {
                 // Crossings of several mirror planes may cost vertices, and these may be missing for gaps.
-                let of_one = shell_of(mirrors.first())?;
+                let of_one = shell_of(hull_of(mirrors.first())?);
                 let other = simplify_hull(&of_one, options, may_coarsen, self.effort, &simplify);
                 if let Err(CageGenError::Cancelled(cancelled)) = other {
                     return Err(cancelled.into());

@@ -147,7 +147,22 @@ pub(super) struct Shell {
     pub(super) gaps: Vec<Gap>,
 }
 
-impl Shell {
+/// A solid in a lattice and the hull around it, before the hull is smoothed.
+pub(super) struct VoxelHull {
+    lattice: Lattice,
+    stretch: DVec3,
+    fineness: f64,
+    longest: f64,
+    /// Requested distance of the cage from the model, object units.
+    asked: f64,
+    solid: Voxels,
+    filled: Voxels,
+    stairs: Surface,
+    /// Number of components before bridges of voxels join them.
+    pub(super) separate: usize,
+}
+
+impl VoxelHull {
     /// Builds the hull of a model on a lattice of `n` voxels along the model's longest side, with the given stretch.
     /// Passages of the hull are filled if it has more than `handles` handles. `go_on` may cancel.
     pub(super) fn new(
@@ -186,8 +201,27 @@ impl Shell {
         }
         close_handles(&mut hull, handles, mirrors);
         go_on(0.8)?;
-        let stairs = Surface::of(&hull, mirrors);
-        let filled = hull;
+        Ok(Self {
+            stretch,
+            fineness: n as f64 / first_voxels(options.target as usize) as f64,
+            longest: (bounds[1] - bounds[0]).max_element(),
+            asked,
+            solid,
+            stairs: Surface::of(&hull, mirrors),
+            filled: hull,
+            separate,
+            lattice,
+        })
+    }
+
+    /// Number of vertices of the hull, or of its half with a mirror.
+    pub(super) fn n_vertices(&self) -> usize {
+        self.stairs.positions.len()
+    }
+
+    /// Smooths the hull, which takes most of the time of making a shell.
+    pub(super) fn smoothed(self) -> Shell {
+        let Self { lattice, stretch, fineness, longest, asked, solid, filled, stairs, separate } = self;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
         // Dilate the obstacle by the whole voxels of the clearance; the rest, less than a voxel, is a distance that
         // triangles keep from it.
@@ -198,20 +232,20 @@ impl Shell {
         }
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole, stretch };
         let hull = smooth_hull(&stairs, &obstacle);
-        Ok(Self {
+        Shell {
             gaps: Vec::new(),
             parts: solid.parts(),
             solid,
             clearance: clearance * lattice.shortest(),
-            fineness: n as f64 / first_voxels(options.target as usize) as f64,
-            longest: (bounds[1] - bounds[0]).max_element(),
+            fineness,
+            longest,
             lattice,
             obstacle,
             filled,
             hull,
             stairs,
             separate,
-        })
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::{
     CageGenError, CageKind, CageOptions, CageReport, Effort, GeneratedCage, Lattice, MAX_FINE_HULL, MAX_ROWS,
-    MAX_VISITS, Mirror, Mirrors, Shell, Simplification, Symmetry, check_input, generate, simplify_hull,
+    MAX_VISITS, Mirror, Mirrors, Simplification, Symmetry, VoxelHull, check_input, generate, simplify_hull,
     smooth,
 };
 use cagework_core::bind::bind;
@@ -492,7 +492,8 @@ fn collapsing_ends_when_the_searches_take_too_long() {
     let options = options(20);
     let bounds = check_input(&soup.0, &soup.1, &options).unwrap();
     let of = (Mirrors::NONE, usize::MAX);
-    let shell = Shell::new(&soup.0, &soup.1, bounds, (36, DVec3::ONE), of, &options, &|_| Ok(())).unwrap();
+    let hull = VoxelHull::new(&soup.0, &soup.1, bounds, (36, DVec3::ONE), of, &options, &|_| Ok(()));
+    let shell = hull.unwrap().smoothed();
     let simplified = |visits| {
         let effort = Effort(Cell::new(visits));
         let made = simplify_hull(&shell, &options, true, &effort, &|_| Ok(())).unwrap();
