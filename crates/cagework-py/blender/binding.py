@@ -59,7 +59,7 @@ class Weights:
             frames = str(file["frames"])
             self.matrix, self.extra = None, None
             if "offsets" in file:
-                self.extra = {"frames": json.loads(frames), "offsets": sparse(file["offsets"])}
+                self.extra = {"frames": json.loads(frames), "offsets": entries(file["offsets"])}
                 self.rested = cw.deform(self.sparse(), self.rest, self.extra)
 
     def sparse(self):
@@ -89,6 +89,20 @@ class Seen:
 WEIGHTS_CACHE: dict[str, Weights] = {}
 # By the mesh's `session_uid`: copies of a mesh share their stamp.
 SEEN: dict[int, Seen] = {}
+
+
+def entries(matrix):
+    """The offsets of a report from a dense matrix."""
+    vertex, column = matrix.nonzero()
+    values = matrix[vertex, column].tolist()
+    return {"columns": matrix.shape[1], "vertex": vertex.tolist(), "column": column.tolist(), "value": values}
+
+
+def dense(offsets, n_points):
+    """The dense matrix of the offsets of a report."""
+    matrix = np.zeros((n_points, offsets["columns"]), np.float32)
+    matrix[offsets["vertex"], offsets["column"]] = offsets["value"]
+    return matrix
 
 
 def sparse(rows):
@@ -268,7 +282,7 @@ class Job:
         for obj, matrix, (weights, report) in zip(self.objects, self.to_bind, self.results):
             mesh, parts = obj.data, {"rows": weights.toarray(), "rest": self.rest, "cage_local": self.cage_local}
             if report.get("offsets") is not None:
-                parts["offsets"] = report["offsets"].toarray()
+                parts["offsets"] = dense(report["offsets"], len(parts["rows"]))
             archive = io.BytesIO()
             np.savez(archive, frames=json.dumps(report["frames"]), **parts)
             bound = mesh.cagework

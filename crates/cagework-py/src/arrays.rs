@@ -9,6 +9,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use serde::{Deserialize, Serialize};
 
 use crate::error;
 use crate::options::{dictionary, from_dictionary};
@@ -258,17 +259,57 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
         .map_err(|e| error::array(format!("weights: {e}")))
 }
 
+/// The entries of a sparse matrix, row by row. Most rows are empty.
+#[derive(Default, Serialize, Deserialize)]
+struct Offsets {
+    /// Number of columns of the matrix.
+    columns: u32,
+    vertex: Vec<u32>,
+    column: Vec<u32>,
+    value: Vec<f32>,
+}
+
+impl Offsets {
+    fn of(matrix: &Weights) -> Self {
+        let mut all = Self { columns: matrix.n_columns() as u32, ..Self::default() };
+        for (row, (columns, values)) in matrix.rows().enumerate() {
+            all.vertex.extend(columns.iter().map(|_| row as u32));
+            all.column.extend(columns);
+            all.value.extend(values);
+        }
+        all
+    }
+
+    /// The matrix, with `n_rows` rows.
+    ///
+    /// # Errors
+    /// `ArrayError` if the entries are not those of such a matrix in the order of its rows.
+    fn matrix(self, n_rows: usize) -> PyResult<Weights> {
+        let n = self.vertex.len();
+        let fits = self.vertex.is_sorted() && self.vertex.last().is_none_or(|&row| (row as usize) < n_rows);
+        if !fits || self.column.len() != n || self.value.len() != n {
+            let fault =
+                "the offsets of the report do not match the weights: pass the report of the same bind";
+            return Err(error::array(fault));
+        }
+        let end_of = |row: usize| self.vertex.partition_point(|&vertex| (vertex as usize) < row) as u32;
+        let indptr = (0..=n_rows).map(end_of).collect();
+        Weights::new(self.columns, indptr, self.column, self.value)
+            .map_err(|e| error::array(format!("offsets: {e}")))
+    }
+}
+
 /// Adds `outside`, `frames` and `offsets` to a report. Splits the offset columns off the weights, and returns the
 /// weights of the controls.
 ///
 /// # Errors
-/// The errors of [`matrix_of`], if the weights have offset columns.
+/// Never in practice, because reports contain only text, numbers and lists.
 pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
     let (py, Binding { weights, frames, outside, .. }) = (report.py(), binding);
     let points = PyDict::new(py);
-    points.set_item("vertex", PyArray1::from_iter(py, outside.iter().map(|o| o.vertex as i32)))?;
-    points.set_item("distance", PyArray1::from_iter(py, outside.iter().map(|o| o.distance)))?;
-    points.set_item("share", PyArray1::from_iter(py, outside.iter().map(|o| o.share)))?;
+    points.set_item("vertex", outside.iter().map(|o| o.vertex).collect::<Vec<_>>())?;
+    points.set_item("distance", outside.iter().map(|o| o.distance).collect::<Vec<_>>())?;
+    points.set_item("share", outside.iter().map(|o| o.share).collect::<Vec<_>>())?;
     report.set_item("outside", points)?;
     report.set_item("frames", dictionary(py, &frames)?)?;
     if !frames.is_used() {
@@ -276,7 +317,7 @@ pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -
     }
     let n = weights.n_columns() as u32;
     let n_controls = n - frames.n_columns() as u32;
-    report.set_item("offsets", matrix_of(py, weights.columns(n_controls..n))?)?;
+    report.set_item("offsets", dictionary(py, &Offsets::of(&weights.columns(n_controls..n)))?)?;
     Ok(weights.columns(0..n_controls))
 }
 
@@ -290,9 +331,9 @@ pub(crate) fn join_offsets(report: Option<&Bound<'_, PyAny>>, own: Weights) -> P
     if !frames.is_used() {
         return Ok((own, frames));
     }
-    let offsets = weights(&report.get_item("offsets")?)?;
     let [rows, columns] = [own.n_rows(), own.n_columns()];
-    if offsets.n_rows() != rows || offsets.n_columns() != frames.n_columns() || !frames.fits(columns) {
+    let offsets = from_dictionary::<Offsets>(&report.get_item("offsets")?)?.matrix(rows)?;
+    if offsets.n_columns() != frames.n_columns() || !frames.fits(columns) {
         return Err(error::array(format!(
             "the report does not match the weights, which have shape [{rows}, {columns}]"
         )));

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 
 use crate::cage::Cage;
 use crate::options::{dictionary, options};
-use crate::{arrays, error, work};
+use crate::{arrays, error, files, work};
 
 /// Reads the options of a bind and checks their ranges.
 ///
@@ -25,15 +25,16 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
     Ok(all)
 }
 
-/// Binds points to a cage by harmonic coordinates: bind(points, cage, *, progress=None, **options) -> (weights, report)
+/// Binds points to a cage by harmonic coordinates: bind(points, cage, *, progress=None, grid="auto", ...) -> (weights, report)
 ///
-/// points: [n_points, 3] float32 or float64, object units. A C-contiguous float32 array is not copied, so do not write to it while
+/// points: [n_points, 3] float32 or float64, object units; or a model, as read_model takes it, whose vertices are bound. A C-contiguous float32 array is not copied, so do not write to it while
 /// bind runs.
 ///
 /// Returns (weights, report). weights: scipy.sparse.csr_array [n_points, n_cage] of float32; the rows of points inside sum to 1. report: dict with
 /// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and the other entries that
-/// `cagework bind --report` writes; outside: arrays vertex [k], distance [k] (object units) and share [k] of the points outside the
-/// cage. If points are outside, or near controls inside the cage, it also has offsets (csr_array) and frames, which deform uses.
+/// `cagework bind --report` writes; outside: lists vertex [k], distance [k] (object units) and share [k] of the points outside the
+/// cage. If points are outside, or near controls inside the cage, it also has offsets (the entries of a sparse
+/// matrix) and frames, which deform uses. json.dumps takes the report, and deform takes what json.loads returns.
 ///
 /// Options, as for `cagework bind`: grid="auto" (cells along the longest side: 64, 96, 128 or 192, so that the narrowest part
 /// and gap of the cage are four cells wide if possible, or up to 320 if fewer do not resolve the cage; or a number from 8
@@ -41,7 +42,8 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// solver="multigrid", "jacobi" or "cg", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
 /// (bytes), outside="extend", "stay" or "refuse".
 ///
-/// progress: function that is called with the completed fraction, 0 to 1, every 50 ms; raise in it to cancel.
+/// progress: function that is called with the completed fraction, 0 to 1, every 50 ms and at the end; raise in it to cancel. Or a
+/// bar of tqdm: progress=tqdm(total=100).
 ///
 /// Raises BindError (for example if no point is inside, or the memory limit is exceeded), OptionError, ArrayError. Ctrl-C cancels.
 ///
@@ -50,7 +52,10 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// >>> bool(np.allclose(weights @ cage.vertices, mesh.vertices, atol=1e-3))
 /// True
 #[pyfunction]
-#[pyo3(signature = (points, cage, *, progress = None, **options))]
+#[pyo3(
+    signature = (points, cage, *, progress = None, **options),
+    text_signature = "(points, cage, *, progress=None, grid='auto', method='embedded', solver=None, threads=0, tau=1e-05, max_iterations=20000, sparsify=0.0, memory_limit=4294967296, outside='extend')"
+)]
 pub(crate) fn bind<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
@@ -59,7 +64,8 @@ pub(crate) fn bind<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<WeightsAndReport<'py>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
-    let points = arrays::points("points", points, None, cage.get().origin())?;
+    let points = files::vertices_of("points", points)?;
+    let points = arrays::points("points", &points, None, cage.get().origin())?;
     let positions = points.as_slice();
     let options = BindOptions { held: size_of_val(positions) as u64, ..options };
     let binding =
@@ -67,9 +73,9 @@ pub(crate) fn bind<'py>(
     weights_and_report(py, binding.map_err(error::bind)?)
 }
 
-/// Binds several models to one cage with one solve: bind_many(models, cage, *, progress=None, **options) -> list of (weights, report)
+/// Binds several models to one cage with one solve: bind_many(models, cage, *, progress=None, grid="auto", ...) -> list of (weights, report)
 ///
-/// models: list of points [n_points, 3], such as clothes, levels of detail or variants. The fields are solved once for all models, and
+/// models: list of points [n_points, 3] or of models, such as clothes, levels of detail or variants. The fields are solved once for all models, and
 /// then sampled for each model; the times in a report do not include this solve. Each result is identical to that of bind. The fields
 /// of all columns are kept in memory and may take half of memory_limit. progress and options are those of bind.
 ///
@@ -80,7 +86,10 @@ pub(crate) fn bind<'py>(
 /// >>> [weights.shape[0] for weights, _ in cw.bind_many([body, vest], cage, grid=24)] == [len(body), 50]
 /// True
 #[pyfunction]
-#[pyo3(signature = (models, cage, *, progress = None, **options))]
+#[pyo3(
+    signature = (models, cage, *, progress = None, **options),
+    text_signature = "(models, cage, *, progress=None, grid='auto', method='embedded', solver=None, threads=0, tau=1e-05, max_iterations=20000, sparsify=0.0, memory_limit=4294967296, outside='extend')"
+)]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python list to an owned vector")]
 pub(crate) fn bind_many<'py>(
     py: Python<'py>,
@@ -90,7 +99,10 @@ pub(crate) fn bind_many<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Vec<WeightsAndReport<'py>>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
-    let of = |points| arrays::points("points", points, None, cage.get().origin());
+    let of = |points| {
+        let points = files::vertices_of("points", points)?;
+        arrays::points("points", &points, None, cage.get().origin())
+    };
     let points: Vec<_> = models.iter().map(of).collect::<PyResult<_>>()?;
     let positions: Vec<_> = points.iter().map(arrays::Points::as_slice).collect();
     let all = work::run_with(py, progress, |progress| {

@@ -112,9 +112,9 @@ impl Cage {
     /// True
     #[staticmethod]
     #[pyo3(signature = (path, smooth = 0.0))]
-    fn load(py: Python<'_>, path: PathBuf, smooth: f64) -> PyResult<Self> {
+    fn load(py: Python<'_>, path: &Bound<'_, PyAny>, smooth: f64) -> PyResult<Self> {
         let smooth = steps(smooth)?;
-        let model = files::Source::File(path).read()?;
+        let model = files::Source::of("path", path)?.read()?;
         model.require_faces().map_err(error::model)?;
         Self::of(py, (&model.cage_mesh(), model.origin()), smooth, None)
     }
@@ -196,13 +196,10 @@ impl Cage {
 
     /// Whether the cages have the same vertices, faces and steps of subdivision.
     fn __eq__(&self, other: &Self) -> bool {
-        let [a, b] = [self, other].map(|cage| cage.set.cage());
-        (self.origin, self.smooth()) == (other.origin, other.smooth())
-            && a.positions() == b.positions()
-            && a.faces() == b.faces()
+        self == other
     }
 
-    fn __hash__(&self) -> u64 {
+    pub(crate) fn __hash__(&self) -> u64 {
         let cage = self.set.cage();
         let mut hasher = DefaultHasher::new();
         cage.faces().hash(&mut hasher);
@@ -210,16 +207,43 @@ impl Cage {
         hasher.finish()
     }
 
-    /// Arguments that pickle passes to the constructor.
-    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        (self.vertices(py), self.faces(py)?, self.smooth()).into_pyobject(py)
+    /// The function that makes a pickled cage, and its arguments.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let made = serde_json::to_string(&(&self.report, &self.rings)).map_err(error::cage)?;
+        let arguments = (self.vertices(py), self.faces(py)?, self.smooth(), made).into_pyobject(py)?;
+        Ok((py.import("cagework._native")?.getattr("restored_cage")?, arguments))
     }
 }
 
-/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, *, rig=None, progress=None, **options) -> Cage
+impl PartialEq for Cage {
+    fn eq(&self, other: &Self) -> bool {
+        let [a, b] = [self, other].map(|cage| cage.set.cage());
+        (self.origin, self.smooth()) == (other.origin, other.smooth())
+            && a.positions() == b.positions()
+            && a.faces() == b.faces()
+    }
+}
+
+/// Makes a cage that was pickled. `made`: JSON of its report and rings.
+///
+/// Raises `CageError`, `ArrayError`.
+#[pyfunction]
+pub(crate) fn restored_cage(
+    py: Python<'_>,
+    vertices: &Bound<'_, PyAny>,
+    faces: &Bound<'_, PyAny>,
+    smooth: f64,
+    made: &str,
+) -> PyResult<Cage> {
+    let (report, rings) = serde_json::from_str(made).map_err(error::cage)?;
+    Ok(Cage { report, rings, ..Cage::new(py, vertices, faces, smooth)? })
+}
+
+/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles=None, *, rig=None, progress=None, target=80, ...) -> Cage
 ///
 /// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap
-/// itself. rig: the model, or list of models, from which read_model read them, for the joints: path or bytes.
+/// itself. Without triangles, vertices is a model, or a list of models, as read_model takes it: the cage encloses its
+/// morph targets too and follows its joints, as with `cagework cage`. rig: the model, or list of models, from which read_model read them, for the joints: path or bytes.
 ///
 /// Options, as for `cagework cage`: target=80 (number of vertices, 8 to 400; simple shapes get fewer, and holes and gaps
 /// may need more), detail=0.028 (fraction of the longest side), quads=True, kind="auto", "skeleton" (rings of quads along
@@ -234,23 +258,33 @@ impl Cage {
 /// >>> cage.vertices.shape[1]
 /// 3
 #[pyfunction]
-#[pyo3(signature = (vertices, triangles, *, rig = None, progress = None, **options))]
+#[pyo3(
+    signature = (vertices, triangles = None, *, rig = None, progress = None, **options),
+    text_signature = "(vertices, triangles=None, *, rig=None, progress=None, target=80, detail=0.028, quads=True, kind='auto', symmetry='auto', per_component=False, clearance=0.0, voxels=0, smooth=0)"
+)]
 pub(crate) fn generate_cage(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
-    triangles: &Bound<'_, PyAny>,
+    triangles: Option<&Bound<'_, PyAny>>,
     rig: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Cage> {
     let options: CageOptions = self::options(options)?;
     options.check().map_err(error::option)?;
-    let (points, origin) = arrays::points_and_origin("vertices", vertices, None)?;
-    let triangles = arrays::triangles(triangles)?;
-    let positions = points.as_slice();
-    let rig = rig.map(|rig| files::rig(py, rig, positions.len(), origin)).transpose()?;
+    let mut rig = rig.map(|rig| files::sources("rig", rig)).transpose()?;
+    let (positions, triangles, origin) = if let Some(triangles) = triangles {
+        let (points, origin) = arrays::points_and_origin("vertices", vertices, None)?;
+        (points.as_slice().to_vec(), arrays::triangles(triangles)?, origin)
+    } else {
+        let models = files::sources("vertices", vertices)?;
+        let joined = work::run(py, |_| files::read_all(&models, true, None))??;
+        rig.get_or_insert(models);
+        joined
+    };
+    let rig = rig.map(|rig| files::rig(py, &rig, positions.len(), origin)).transpose()?;
     let generated = work::run_with(py, progress, |progress| {
-        generate_of_kind(positions, &triangles, rig.as_ref(), &options, progress)
+        generate_of_kind(&positions, &triangles, rig.as_ref(), &options, progress)
     })?;
     let generated = generated.map_err(error::cage)?;
     let report = Some(generated.report);
@@ -299,7 +333,8 @@ pub(crate) fn check_cage<'py>(
     let (positions, origin) = arrays::points_and_origin("vertices", &vertices, None)?;
     let positions = positions.as_slice().to_vec();
     let mesh = PolygonMesh { positions, faces: arrays::faces(&cage.getattr("faces")?)? };
-    let points = points.map(|points| arrays::points("points", points, None, origin)).transpose()?;
+    let points = points.map(|points| files::vertices_of("points", points)).transpose()?;
+    let points = points.as_ref().map(|points| arrays::points("points", points, None, origin)).transpose()?;
     let inside = points.as_ref().map(arrays::Points::as_slice);
     let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid), smooth))?;
     dictionary(py, &check.problems)

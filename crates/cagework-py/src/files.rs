@@ -3,40 +3,66 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use cagework_core::BindOptions;
 use cagework_core::rig::Rig;
+use cagework_core::{BindOptions, PolygonMesh};
 use cagework_io::{Clip, Model, ModelFormat, Resolve, shown};
-use glam::DVec3;
-use numpy::PyArray2;
+use glam::{DVec3, Vec3};
+use numpy::{PyArray2, PyUntypedArray};
 use pyo3::exceptions::{PyOSError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList, PyMemoryView};
 
 use crate::{arrays, error, work};
 
-/// A model to read.
+/// A model to read: what all functions accept as a model.
 pub(crate) enum Source {
     File(PathBuf),
-    Bytes(Vec<u8>),
+    /// Name that may tell the format, and the bytes of a file.
+    Bytes(String, Vec<u8>),
+    /// Mesh relative to an origin near it.
+    Mesh(PolygonMesh, DVec3),
 }
 
 impl Source {
-    /// Interprets an argument: bytes, a bytearray or a memoryview, or a path.
+    /// Interprets an argument: a path; the bytes of a file, also as a bytearray, memoryview or file object; a mesh
+    /// object; or a tuple of vertices and faces.
     ///
     /// # Errors
-    /// `TypeError` with the name of the argument.
+    /// `TypeError` with the name of the argument; the errors of reading a file object; `ArrayError`.
     pub(crate) fn of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(bytes) = argument.cast::<PyBytes>() {
-            return Ok(Self::Bytes(bytes.as_bytes().to_vec()));
-        }
-        if argument.is_instance_of::<PyByteArray>() || argument.is_instance_of::<PyMemoryView>() {
+        if argument.is_instance_of::<PyMemoryView>() {
             let bytes = argument.py().get_type::<PyBytes>().call1((argument,))?;
-            return Ok(Self::Bytes(bytes.extract()?));
+            return Ok(Self::Bytes("model".to_owned(), bytes.extract()?));
         }
-        argument.extract().map(Self::File).or_else(|_| {
+        if let Some(file) = Self::file(name, argument)? {
+            return Ok(file);
+        }
+        let Some((vertices, faces)) = mesh_of(argument)? else {
             let kind = argument.get_type().name()?;
-            Err(PyTypeError::new_err(format!("{name}: expected a path or bytes, got {kind}")))
-        })
+            return Err(PyTypeError::new_err(format!(
+                "{name}: expected a path, bytes, a file opened with mode 'rb', a mesh with vertices and faces, or \
+                 (vertices, faces), got {kind}"
+            )));
+        };
+        let (positions, origin) = arrays::points_and_origin("vertices", &vertices, None)?;
+        let positions = positions.as_slice().to_vec();
+        Ok(Self::Mesh(PolygonMesh { positions, faces: arrays::faces(&faces)? }, origin))
+    }
+
+    /// Interprets a path, bytes, a bytearray or a file object; `None` for anything else.
+    fn file(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
+        if argument.is_instance_of::<PyBytes>() || argument.is_instance_of::<PyByteArray>() {
+            return Ok(Some(Self::Bytes("model".to_owned(), argument.extract()?)));
+        }
+        if let Ok(path) = argument.extract() {
+            return Ok(Some(Self::File(path)));
+        }
+        if !argument.hasattr("read")? {
+            return Ok(None);
+        }
+        let content = models(argument.py())?.call_method1("content_of", (name, argument))?.extract()?;
+        let (name, bytes): (String, Vec<u8>) = content;
+        Ok(Some(Self::Bytes(name, bytes)))
     }
 
     /// Reads the model and the files in its folder that it refers to, with the default memory limit.
@@ -68,7 +94,8 @@ impl Source {
             }
         };
         let model = match self {
-            Self::Bytes(bytes) => read("model", bytes, &mut |_| None),
+            Self::Mesh(mesh, origin) => Model::of_mesh("mesh.obj", mesh, *origin),
+            Self::Bytes(name, bytes) => read(name, bytes, &mut |_| None),
             Self::File(path) => {
                 let bytes = cagework_files::read(path).map_err(|e| named(path, &e))?;
                 read(&path.to_string_lossy(), &bytes, &mut |name| beside(path, name))
@@ -76,6 +103,32 @@ impl Source {
         };
         model.map_err(error::model)
     }
+}
+
+/// The module `cagework._models`.
+fn models(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {
+    py.import("cagework._models")
+}
+
+/// Returns the vertices and faces of a mesh object or of a tuple; `None` for anything else.
+fn mesh_of<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+    models(value.py())?.call_method1("mesh_of", (value,))?.extract()
+}
+
+/// Returns the vertices of a model, or an array unchanged.
+///
+/// # Errors
+/// `OSError`, `ModelError`.
+pub(crate) fn vertices_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if value.is_instance_of::<PyUntypedArray>() || value.is_instance_of::<PyList>() {
+        return Ok(value.clone());
+    }
+    if let Some(file) = Source::file(name, value)? {
+        let model = work::run(value.py(), move |_| file.read())??;
+        let origin = model.origin();
+        return arrays::array_of(value.py(), model.positions, origin);
+    }
+    Ok(mesh_of(value)?.map_or_else(|| value.clone(), |(vertices, _)| vertices))
 }
 
 /// Reads a file that the model `main` refers to. `None` if it does not exist.
@@ -107,11 +160,38 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 }
 
 /// Interprets an argument that is a model or a list of models.
-fn sources(name: &str, models: &Bound<'_, PyAny>) -> PyResult<Vec<Source>> {
+pub(crate) fn sources(name: &str, models: &Bound<'_, PyAny>) -> PyResult<Vec<Source>> {
     match models.cast::<PyList>() {
         Ok(models) => models.iter().map(|model| Source::of(name, &model)).collect(),
         Err(_) => Ok(vec![Source::of(name, models)?]),
     }
+}
+
+/// Positions, triangles and the origin of the positions.
+type Joined = (Vec<Vec3>, Vec<[u32; 3]>, DVec3);
+
+/// Reads the meshes of several models as one.
+///
+/// # Errors
+/// `OSError`, `ModelError`.
+pub(crate) fn read_all(sources: &[Source], states: bool, clip: Option<&str>) -> PyResult<Joined> {
+    let (mut positions, mut triangles, mut origin) = (Vec::new(), Vec::new(), None);
+    let is_alone = sources.len() == 1;
+    for source in sources {
+        let mut model = source.read()?;
+        model.set_origin(*origin.get_or_insert(model.origin()));
+        // In a list, a model that lacks the clip contributes no frames.
+        let clip = clip.filter(|clip| is_alone || Clip::named(&model.clips(), clip).is_ok());
+        let (own, corners) = if states {
+            model.states(clip).map_err(error::model)?
+        } else {
+            (model.positions, model.triangles)
+        };
+        let first = positions.len() as u32;
+        positions.extend(own);
+        triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
+    }
+    Ok((positions, triangles, origin.ok_or_else(|| error::model("the list of models is empty"))?))
 }
 
 /// Reads the joints of the models from which `n` vertices were read, at rest or with the ends of their morph targets.
@@ -119,11 +199,10 @@ fn sources(name: &str, models: &Bound<'_, PyAny>) -> PyResult<Vec<Source>> {
 ///
 /// # Errors
 /// `OSError`, `ModelError` if a model cannot be read or the models have another number of vertices.
-pub(crate) fn rig(py: Python<'_>, models: &Bound<'_, PyAny>, n: usize, origin: DVec3) -> PyResult<Rig> {
-    let sources = sources("rig", models)?;
+pub(crate) fn rig(py: Python<'_>, sources: &[Source], n: usize, origin: DVec3) -> PyResult<Rig> {
     work::run(py, move |_| -> PyResult<_> {
         let mut all = Vec::new();
-        for source in &sources {
+        for source in sources {
             let mut model = source.read()?;
             model.set_origin(origin);
             let rig = model.rest_rig().map_err(error::model)?;
@@ -147,8 +226,11 @@ pub(crate) fn rig(py: Python<'_>, models: &Bound<'_, PyAny>, n: usize, origin: D
 
 /// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
-/// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such
-/// as the pose of a cage. A list of models gives the vertices of all of them, for one cage around a body and its clothes.
+/// model: what each function accepts as a model: the path of a file in any format of docs/formats.md; its bytes, or a file object
+/// opened with mode "rb"; a mesh object of trimesh, Open3D, PyVista or meshio, or any other one with vertices and faces; or
+/// (vertices, faces). Bytes and file objects cannot refer to other files. A mesh counts as an OBJ file. A file without faces
+/// can be read as well, such as the pose of a cage. A list of models gives the vertices of all of them, for one cage
+/// around a body and its clothes.
 ///
 /// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as
 /// in the file. They are float32, or float64 if float32 would lose digits, as for map coordinates.
@@ -170,25 +252,8 @@ pub(crate) fn read_model<'py>(
     clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
     let sources = sources("model", model)?;
-    let (positions, triangles, origin) = work::run(py, move |_| -> PyResult<_> {
-        let (mut positions, mut triangles, mut origin) = (Vec::new(), Vec::new(), None);
-        let is_alone = sources.len() == 1;
-        for source in &sources {
-            let mut model = source.read()?;
-            model.set_origin(*origin.get_or_insert(model.origin()));
-            // In a list, a model that lacks the clip contributes no frames.
-            let clip = clip.as_deref().filter(|clip| is_alone || Clip::named(&model.clips(), clip).is_ok());
-            let (own, corners) = if states {
-                model.states(clip).map_err(error::model)?
-            } else {
-                (model.positions, model.triangles)
-            };
-            let first = positions.len() as u32;
-            positions.extend(own);
-            triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
-        }
-        Ok((positions, triangles, origin.ok_or_else(|| error::model("the list of models is empty"))?))
-    })??;
+    let (positions, triangles, origin) =
+        work::run(py, move |_| read_all(&sources, states, clip.as_deref()))??;
     Ok((arrays::array_of(py, positions, origin)?, arrays::triples(py, &triangles)?))
 }
 

@@ -27,11 +27,13 @@ mod native {
     #[pymodule_export]
     use crate::bind::{bind, bind_many, deform};
     #[pymodule_export]
-    use crate::cage::{Cage, check_cage, generate_cage};
+    use crate::cage::{Cage, check_cage, generate_cage, restored_cage};
     #[pymodule_export]
     use crate::field::Field;
     #[pymodule_export]
     use crate::files::{read_model, to_glb};
+    #[pymodule_export]
+    use crate::options::defaults;
     #[pymodule_export]
     use crate::proportions::{humanoid_bones, proportions};
     #[pymodule_export]
@@ -39,7 +41,7 @@ mod native {
     #[pymodule_export]
     use crate::reshape::reshape;
     #[pymodule_export]
-    use crate::splats::Splats;
+    use crate::splats::{Splats, restored_splats};
     #[pymodule_export]
     use crate::transfer::transfer;
     #[pymodule_export]

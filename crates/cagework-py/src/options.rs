@@ -1,5 +1,7 @@
 //! Conversion of keyword arguments to options, and of reports to dictionaries.
 
+use cagework_cage::CageOptions;
+use cagework_core::BindOptions;
 use cagework_io::{json_fault, value_fault};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -56,6 +58,14 @@ fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
             value.get_type()
         ))
     })
+}
+
+/// Returns the default options of `bind` and of `generate_cage`: a list of two dicts. The tests compare them with the signatures.
+///
+/// Raises nothing.
+#[pyfunction]
+pub(crate) fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    dictionary(py, &(BindOptions::default(), CageOptions::default()))
 }
 
 /// Converts a dictionary to a struct; the inverse of [`dictionary`].

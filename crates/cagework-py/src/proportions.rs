@@ -14,10 +14,10 @@ use crate::cage::Cage;
 use crate::files::Source;
 use crate::{arrays, error, work};
 
-/// Poses the cage of a humanoid by proportions: proportions(model, cage, factors=None, *, preset=None, bones=None, progress=None, **options)
+/// Poses the cage of a humanoid by proportions: proportions(model, cage, factors=None, *, preset=None, bones=None, progress=None, grid="auto", ...)
 /// -> [n_controls, 3] float64
 ///
-/// model: path of a rigged model, or its bytes; cage: its cage; factors: dict from proportions to factors from 0.5 to 2. The
+/// model: a rigged model, as for read_model; cage: its cage; factors: dict from proportions to factors from 0.5 to 2. The
 /// proportions are leg, arm, limb (thickness), hand and foot, also with left_ or right_ before them, and torso, shoulder, waist, hip,
 /// head, neck and height. preset: "longer legs", "big head", "hero", "chibi", "slim" or "stout"; factors replace its own. bones: dict
 /// from humanoid bones, with their names in VRM 1.0, to names of joints, for joints that humanoid_bones does not find. progress and
@@ -34,7 +34,10 @@ use crate::{arrays, error, work};
 /// True
 /// >>> data = cw.reshape("humanoid.glb", cage, pose, ground=True, grid=32)
 #[pyfunction]
-#[pyo3(signature = (model, cage, factors = None, *, preset = None, bones = None, progress = None, **options))]
+#[pyo3(
+    signature = (model, cage, factors = None, *, preset = None, bones = None, progress = None, **options),
+    text_signature = "(model, cage, factors=None, *, preset=None, bones=None, progress=None, grid='auto', method='embedded', solver=None, threads=0, tau=1e-05, max_iterations=20000, sparsify=0.0, memory_limit=4294967296, outside='extend')"
+)]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn proportions<'py>(
     py: Python<'py>,
@@ -68,7 +71,7 @@ pub(crate) fn proportions<'py>(
 
 /// Finds the joints of a humanoid: humanoid_bones(model, bones=None) -> dict from bones to names of joints
 ///
-/// model: path of a rigged model, or its bytes; bones: as for proportions. The bones have the names of VRM 1.0. They are those of the
+/// model: a rigged model, as for read_model; bones: as for proportions. The bones have the names of VRM 1.0. They are those of the
 /// file's VRM data, or of joints with usual names, or found by the shape of the skeleton.
 ///
 /// Raises OSError, ModelError if the model is not a humanoid, OptionError.

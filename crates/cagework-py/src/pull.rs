@@ -15,7 +15,7 @@ use crate::{arrays, error, work};
 
 /// Solves for the pose of the cage that moves vertices of the model to targets with little bending:
 /// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5,
-/// **options)
+/// progress=None, grid="auto", ...)
 /// -> [n_cage, 3] float64, object units
 ///
 /// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
@@ -34,7 +34,10 @@ use crate::{arrays, error, work};
 /// >>> bool(np.allclose((weights @ posed)[top], to, atol=0.01))
 /// True
 #[pyfunction]
-#[pyo3(signature = (vertices, triangles, cage, weights, grabs, to, *, pins = None, report = None, start = None, reach = None, relax = 0.5, **options))]
+#[pyo3(
+    signature = (vertices, triangles, cage, weights, grabs, to, *, pins = None, report = None, start = None, reach = None, relax = 0.5, progress = None, **options),
+    text_signature = "(vertices, triangles, cage, weights, grabs, to, *, pins=None, report=None, start=None, reach=None, relax=0.5, progress=None, grid='auto', method='embedded', solver=None, threads=0, tau=1e-05, max_iterations=20000, sparsify=0.0, memory_limit=4294967296, outside='extend')"
+)]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn pull<'py>(
     py: Python<'py>,
@@ -49,6 +52,7 @@ pub(crate) fn pull<'py>(
     start: Option<&Bound<'py, PyAny>>,
     reach: Option<f64>,
     relax: f64,
+    progress: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     // Allow probes outside the cage: they are off the surface by up to 1/64 of the cage's longest side, so a tight cage
@@ -76,7 +80,7 @@ pub(crate) fn pull<'py>(
         Some(f64::INFINITY) => Reach::Whole,
         Some(share) => Reach::Of(share),
     };
-    let posed = work::run(py, |progress| -> PyResult<Vec<DVec3>> {
+    let posed = work::run_with(py, progress, |progress| -> PyResult<Vec<DVec3>> {
         let probes = Probes::new(&mesh, controls).map_err(error::pull)?;
         let of_probes = bind_points(probes.points(), controls, &options, progress).map_err(error::bind)?;
         let pull = Pull::new(&mesh, controls, probes, &of_probes.frames.folded(&of_probes.weights))

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use cagework_core::splats::{Splats as CoreSplats, n_harmonics};
-use cagework_io::{Model, ModelFormat};
+use cagework_io::{Model, ModelFormat, RestoreError, Store, StoredArrays};
 use glam::{Mat3, Quat, Vec3};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyTuple};
 
 use crate::field::Field;
 use crate::{arrays, error, files, work};
@@ -31,8 +32,9 @@ pub(crate) struct Splats {
 #[pymethods]
 impl Splats {
     #[new]
-    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let model = work::run(py, move |_| files::Source::File(path).read())??;
+    fn new(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let source = files::Source::of("path", path)?;
+        let model = work::run(py, move |_| source.read())??;
         let splats = model.splats().cloned().ok_or_else(|| error::model("it has no Gaussian splats"))?;
         Ok(Self { model: Arc::new(model), splats })
     }
@@ -43,6 +45,35 @@ impl Splats {
 
     fn __repr__(&self) -> String {
         format!("Splats({} splats, spherical harmonics of degree {})", self.splats.len(), self.splats.degree)
+    }
+
+    /// Whether the splats have the same numbers.
+    fn __eq__(&self, other: &Self) -> bool {
+        self.model.origin() == other.model.origin() && self.splats == other.splats
+    }
+
+    fn __hash__(&self) -> u64 {
+        self.splats.len() as u64
+    }
+
+    /// The function that makes pickled splats, and its arguments.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let arrays = work::run(py, |_| {
+            let (mut store, splats) = (Store::default(), &self.splats);
+            let is_changed = self.model.splats() != Some(splats);
+            store.push(&[u8::from(is_changed), splats.degree]);
+            if is_changed {
+                for vectors in [&splats.positions, &splats.scales, &splats.colors, &splats.harmonics] {
+                    store.push(vectors);
+                }
+                store.push(&splats.rotations);
+                store.push(&splats.opacities);
+            }
+            Model::clone(&self.model).store(&mut store);
+            store.into_arrays()
+        })?;
+        let arrays: Vec<_> = arrays.iter().map(|bytes| PyBytes::new(py, bytes)).collect();
+        Ok((py.import("cagework._native")?.getattr("restored_splats")?, (arrays,).into_pyobject(py)?))
     }
 
     /// Centres, [n, 3], object units.
@@ -154,6 +185,33 @@ impl Splats {
             work::run(py, |_| self.model.write_splats(format, &self.splats))?.map_err(error::model)?;
         files::write(&path, &bytes)
     }
+}
+
+/// Makes splats that were pickled.
+///
+/// Raises `ModelError`.
+#[pyfunction]
+pub(crate) fn restored_splats(py: Python<'_>, arrays: Vec<Vec<u8>>) -> PyResult<Splats> {
+    work::run(py, move |_| {
+        let mut arrays = arrays.into_iter();
+        let mut next = || arrays.next();
+        let mut from = StoredArrays(&mut next);
+        let &[is_changed, degree] = from.numbers::<u8>()?.as_slice() else {
+            return Err(RestoreError::Damaged);
+        };
+        let changed = if is_changed == 0 {
+            None
+        } else {
+            let [positions, scales] = [from.numbers()?, from.numbers()?];
+            let [colors, harmonics] = [from.numbers()?, from.numbers()?];
+            let (rotations, opacities) = (from.numbers()?, from.numbers()?);
+            Some(CoreSplats { positions, scales, rotations, opacities, colors, degree, harmonics })
+        };
+        let model = Model::restore(&mut from)?;
+        let splats = changed.or_else(|| model.splats().cloned()).ok_or(RestoreError::Damaged)?;
+        Ok(Splats { model: Arc::new(model), splats })
+    })?
+    .map_err(error::model)
 }
 
 impl Splats {

@@ -12,8 +12,8 @@ use crate::{error, work};
 /// Gives clothes the joints, joint weights and morph targets of a body: transfer(body, clothes, *, push_out=None,
 /// memory_limit=4 << 30) -> (bytes, report)
 ///
-/// body: path of a .glb, .gltf, .vrm or .fbx with a skeleton or morph targets, or its bytes; clothes: path of a file in any format of
-/// docs/formats.md, or its bytes. Both must show the same pose in the same units and axes. push_out: move vertices inside the body,
+/// body: path of a .glb, .gltf, .vrm or .fbx with a skeleton or morph targets, its bytes or a file object; clothes: any model,
+/// as for read_model. Both must show the same pose in the same units and axes. push_out: move vertices inside the body,
 /// or closer to it than this distance (object units), out to this distance, at rest and in each morph target. memory_limit: bytes.
 ///
 /// Returns the bytes of a GLB, identical to the file that `cagework transfer` writes, and a dict. It has the numbers of positions by

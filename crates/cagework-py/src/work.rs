@@ -8,6 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use cagework_core::{Progress, ProgressEvent};
+use pyo3::types::PyAnyMethods as _;
 use pyo3::{Bound, Py, PyAny, PyResult, Python};
 
 /// Time between two checks for Ctrl-C, and between two calls of a progress function.
@@ -22,7 +23,7 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
 }
 
 /// Runs `work` in another thread and releases the interpreter lock. The calling thread polls for signals, which Python
-/// delivers to its main thread only, and calls `progress` with the completed fraction. If a signal handler or
+/// delivers to its main thread only, and calls `progress` with the completed fraction, also at the end. If a signal handler or
 /// `progress` raises, the work is cancelled.
 ///
 /// # Errors
@@ -37,7 +38,10 @@ pub(crate) fn run_with<T: Send>(
         fraction.store(event.fraction.to_bits(), Ordering::Relaxed);
         if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let progress: Option<Py<PyAny>> = progress.map(|function| function.clone().unbind());
+    let function = |given: &Bound<'_, PyAny>| -> PyResult<Py<PyAny>> {
+        Ok(py.import("cagework._progress")?.call_method1("function_of", (given,))?.unbind())
+    };
+    let progress = progress.map(function).transpose()?;
     let poll = |py: Python<'_>| -> PyResult<()> {
         py.check_signals()?;
         let Some(progress) = &progress else { return Ok(()) };
@@ -60,6 +64,9 @@ pub(crate) fn run_with<T: Send>(
                 }
             }
             let outcome = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
+            if raised.is_none() && progress.is_some() {
+                raised = Python::attach(poll).err();
+            }
             raised.map_or(Ok(outcome), Err)
         })
     })

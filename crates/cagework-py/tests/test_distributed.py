@@ -20,38 +20,45 @@ def name_of_status(dask_worker):
     return dask_worker.status.name
 
 
-def nanny_status():
+def nanny_status(worker):
     """Status of the nanny, which restarts this worker process, but not if the process dies while it starts."""
-    worker = distributed.get_worker()
     ask = worker.rpc(worker.nanny).run
     return sync(worker.loop, ask, function=dumps(name_of_status))["result"]
 
 
-def kill_this_worker():
-    while nanny_status() != "running":
+def kill_this(worker):
+    while nanny_status(worker) != "running":
         pass
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 class SingleKill:
-    """Calls cagework.reshape and logs it. At the first call for each file in `fatal`, kills its process."""
+    """Calls cagework.reshape and logs each file. Before the first result of each file in `fatal` is written, kills its process."""
 
     def __init__(self, log, fatal):
         self.log, self.fatal = log, fatal
 
-    def __call__(self, file, *args, **options):
-        if Path(file).name in self.fatal:
-            try:
-                # Fails unless this is the first call for the file.
-                (self.log / f"{Path(file).name}.killed").touch(exist_ok=False)
-            except FileExistsError:
-                pass
-            else:
-                kill_this_worker()
-        data = cw.reshape(file, *args, **options)
-        with open(self.log / "done", "a") as log:
-            log.write(f"{Path(file).name}\n")
-        return data
+    def __call__(self, files, *args, each, **options):
+        # `each` is called in another thread, which knows no worker.
+        worker = distributed.get_worker()
+
+        def logged(index, data):
+            name = Path(files[index]).name
+            if name in self.fatal:
+                try:
+                    # Fails unless this is the first result of the file.
+                    (self.log / f"{name}.killed").touch(exist_ok=False)
+                except FileExistsError:
+                    pass
+                else:
+                    kill_this(worker)
+            each(index, data)
+            with open(self.log / "done", "a") as log:
+                log.write(f"{name}\n")
+
+        with open(self.log / "solves", "a") as log:
+            log.write(f"{len(files)}\n")
+        cw.reshape(files, *args, each=logged, **options)
 
 
 @pytest.fixture
@@ -81,13 +88,18 @@ def test_files_are_processed_once_each_although_workers_are_killed(client, files
     workers = set(client.run(os.getpid).values())
     assert len(workers) == 2 and os.getpid() not in workers
     options = {"grid": 8, "threads": 1, "client": client, "work": SingleKill(log, fatal)}
-    done = reshape_files(files, out, cage, posed, **options)
+    fractions = []
+    done = reshape_files(files, out, cage, posed, progress=fractions.append, **options)
 
+    # Three groups of 64 and one of 8, and again those whose worker was killed.
+    solves = (log / "solves").read_text().split()
+    assert solves.count("64") >= 3 and "8" in solves and len(solves) < 9
+    assert fractions == sorted(fractions) and fractions[-1] == 1 and any(0 < fraction < 1 for fraction in fractions)
     assert len(list(log.glob("*.killed"))) == len(fatal) == 2
     assert workers != set(client.run(os.getpid).values())
     assert [Path(result["file"]) for result in done] == files
-    # The state is "kept" for files that a worker wrote before it was killed, because its results were lost.
-    assert {result["state"] for result in done} == {"written", "kept"}
+    # Also files that a worker wrote before it was killed.
+    assert {result["state"] for result in done} == {"written"}
     counted = (log / "done").read_text().split()
     assert sorted(counted) == [file.name for file in files]
     assert sorted(out.iterdir()) == [out / file.name for file in files]
@@ -99,6 +111,7 @@ def test_files_are_processed_once_each_although_workers_are_killed(client, files
     (out / files[8].name).unlink()
     again = reshape_files(files, out, cage, posed, **options)
     assert [Path(result["file"]) for result in again if result["state"] == "written"] == files[7:9]
+    assert {result["state"] for result in again} == {"written", "kept"}
     assert len((log / "done").read_text().split()) == N_FILES + 2
 
 
@@ -114,15 +127,21 @@ def test_failures_are_reported_and_other_files_are_written(client, files, tmp_pa
 
 
 class RepeatedKill:
-    """Calls cagework.reshape, and kills its process at each call for one file."""
+    """Calls cagework.reshape, and kills its process at each result of one file."""
 
     def __init__(self, name):
         self.name = name
 
-    def __call__(self, file, *args, **options):
-        if Path(file).name == self.name:
-            kill_this_worker()
-        return cw.reshape(file, *args, **options)
+    def __call__(self, files, *args, each, **options):
+        # `each` is called in another thread, which knows no worker.
+        worker = distributed.get_worker()
+
+        def fatal(index, data):
+            if Path(files[index]).name == self.name:
+                kill_this(worker)
+            each(index, data)
+
+        cw.reshape(files, *args, each=fatal, **options)
 
 
 def test_file_that_kills_its_worker_fails_and_another_is_written(client, files, tmp_path, monkeypatch):

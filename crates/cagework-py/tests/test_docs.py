@@ -52,3 +52,9 @@ def test_installing_from_the_root_builds_this_package(tmp_path):
     subprocess.run([sys.executable, "-c", hook], cwd=PACKAGE, check=True, env={**os.environ, "PATH": path})
     text = next(tmp_path.glob("*.dist-info/METADATA")).read_text()
     assert f"Name: cagework\nVersion: {cw.__version__}\n" in text
+
+
+def test_installing_without_rust_says_so_before_it_downloads(tmp_path):
+    hook = "import from_root; from_root.get_requires_for_build_wheel()"
+    done = subprocess.run([sys.executable, "-c", hook], cwd=PACKAGE, capture_output=True, text=True, env={**os.environ, "PATH": str(tmp_path)})
+    assert done.returncode == 1 and "no cargo on the PATH: install Rust from https://rustup.rs" in done.stderr

@@ -1,3 +1,5 @@
+import pickle
+
 import cagework as cw
 import numpy as np
 import pytest
@@ -100,3 +102,11 @@ def test_wrong_input_is_refused(cage, points):
         cw.Field(cage, cage.vertices[1:])
     with pytest.raises(cw.ArrayError, match="points"):
         cw.Field(cage, cage.vertices, cells=8).map(points[:, :2])
+
+
+def test_fields_are_compared_and_pickled(cage, points):
+    field = cw.Field(cage, bent(cage), cells=8, grid=12)
+    copy = pickle.loads(pickle.dumps(field))
+    assert copy == field and hash(copy) == hash(field) and (copy.map(points) == field.map(points)).all()
+    for other in [field.pose(cage.vertices), cw.Field(cage, bent(cage), cells=9, grid=12), cw.Field(cage, bent(cage), cells=8, grid=13)]:
+        assert other != field

@@ -1,3 +1,4 @@
+import pickle
 import sys
 from types import ModuleType, SimpleNamespace
 
@@ -138,3 +139,17 @@ def test_batches_of_poses_are_products(cage):
         W = sparse.BCOO.from_scipy_sparse(weights)
         other = (W @ jax.numpy.asarray(C, W.dtype)).reshape(-1, len(poses), 3)
         assert np.allclose(other, batch, atol=1e-5)
+
+
+def test_splats_are_compared_and_pickled(capture, cage, tmp_path):
+    splats = cw.Splats(capture[0])
+    bend = splats.deformed(cw.Field(cage, bent(cage), cells=16))
+    assert bend != splats and splats == cw.Splats(capture[0])
+    for one in (splats, bend):
+        copy = pickle.loads(pickle.dumps(one))
+        assert copy == one and hash(copy) == hash(one)
+        one.save(tmp_path / "a.splat")
+        copy.save(tmp_path / "b.splat")
+        assert (tmp_path / "a.splat").read_bytes() == (tmp_path / "b.splat").read_bytes()
+    with pytest.raises(cw.ModelError, match="damaged"):
+        cw._native.restored_splats([])

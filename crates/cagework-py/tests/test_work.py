@@ -86,3 +86,25 @@ def test_progress_that_raises_when_it_is_first_called_cancels_a_fine_grid():
     with pytest.raises(ArithmeticError, match="enough"):
         cw.bind(np.zeros((1, 3)), cw.Cage(*box(5)), grid=160, progress=progress)
     assert len(calls) == 1
+
+
+class Bar:
+    """The part of a bar of tqdm that is used."""
+
+    n, total = 0, None
+
+    def __init__(self):
+        self.seen = []
+
+    def update(self, n=1):
+        self.seen.append(self.n)
+
+    refresh = update
+
+
+def test_progress_moves_a_bar():
+    bar = Bar()
+    cw.bind(np.zeros((1, 3)), cw.Cage(*box(4)), grid=64, progress=bar)
+    assert (bar.n, bar.total) == (100, 100) and bar.seen == sorted(bar.seen)
+    with pytest.raises(TypeError, match="progress: expected a function or a bar of tqdm, got int"):
+        cw.bind(np.zeros((1, 3)), cw.Cage(*box()), grid=8, progress=7)

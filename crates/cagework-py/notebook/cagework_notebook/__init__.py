@@ -1,6 +1,5 @@
 """The notebook widget of cagework. Documented in cagework.show."""
 
-import json
 import struct
 from functools import cache
 from os import PathLike
@@ -10,9 +9,10 @@ from typing import Any
 import anywidget
 import numpy as np
 import traitlets
-from scipy.sparse import hstack
+from scipy.sparse import coo_array, hstack
 
 import cagework as cw
+from cagework._models import content_of, mesh_of
 from cagework._native import to_glb
 
 __all__ = ["CageWidget", "show"]
@@ -90,7 +90,7 @@ def show(
     """Documented in cagework.show."""
     name, data, vertices = _read(model)
     if weights is None:
-        weights, report = cw.bind(cw.read_model(model)[0] if vertices is None else vertices, cage)
+        weights, report = cw.bind(data if vertices is None else vertices, cage)
     rows, columns = weights.shape
     if columns != len(cage.vertices) or (vertices is not None and rows != len(vertices)):
         count = "" if vertices is None else f"{len(vertices)} vertices and "
@@ -98,8 +98,11 @@ def show(
             f"weights: expected a row per vertex and a column per cage vertex ({count}{len(cage.vertices)} cage vertices), "
             f"got [{rows}, {columns}]"
         )
-    whole = hstack([weights, report["offsets"]]) if report and "offsets" in report else weights
-    whole = whole.tocsr()
+    whole = weights.tocsr()
+    if report and "offsets" in report:
+        own = report["offsets"]
+        offsets = coo_array((np.array(own["value"], "f4"), (own["vertex"], own["column"])), (rows, own["columns"]))
+        whole = hstack([weights, offsets]).tocsr()
     corners = [number for face in cage.faces for number in (len(face), *face)]
     sent = {
         "name": name,
@@ -111,32 +114,27 @@ def show(
         "indices": whole.indices.astype("<u4").tobytes(),
         "data": whole.data.astype("<f4").tobytes(),
         "frames": report["frames"] if report else NO_FRAMES,
-        "report": _plain(report or {}),
+        "report": {key: value for key, value in (report or {}).items() if key not in ("outside", "frames", "offsets")},
     }
     return CageWidget(cage, weights, report or {}, sent, theme=theme, height=height)
 
 
-def _plain(report: dict[str, Any]) -> dict[str, Any]:
-    """The entries of a report that are not arrays."""
-    arrays = ("outside", "frames", "offsets")
-    return json.loads(json.dumps({key: value for key, value in report.items() if key not in arrays}))
-
-
 def _read(model: Any) -> tuple[str, bytes, np.ndarray | None]:
     """The name and bytes of a model's file, and its vertices if it was given by arrays."""
-    if isinstance(model, (bytes, str, PathLike)):
-        # The format of bytes is recognised by the first of them.
-        name, data = ("model", model) if isinstance(model, bytes) else (Path(model).name, Path(model).read_bytes())
-        if data[:4] == b"glTF":
-            return f"{Path(name).stem}.glb", data, None
-        glb = to_glb(model)
-        return (name, data, None) if glb is None else (f"{Path(name).stem}.glb", glb, None)
-    vertices, triangles = (model.vertices, model.faces) if hasattr(model, "vertices") else model
-    vertices, triangles = np.asarray(vertices), np.asarray(triangles)
-    for name, array in (("vertices", vertices), ("triangles", triangles)):
-        if array.ndim != 2 or array.shape[1] != 3:
-            raise cw.ArrayError(f"{name}: expected shape [n, 3], got {list(array.shape)}")
-    return "model.ply", _ply(vertices, triangles), vertices
+    mesh = mesh_of(cw.read_model(model) if isinstance(model, list) else model)
+    if mesh is not None:
+        _, triangles = cw.read_model(mesh)
+        vertices = np.asarray(mesh[0])
+        return "model.ply", _ply(vertices, triangles), vertices
+    name = Path(model).name if isinstance(model, (str, PathLike)) else "model"
+    if hasattr(model, "read"):
+        name, model = content_of("model", model)
+    glb = to_glb(model)
+    data = Path(model).read_bytes() if isinstance(model, (str, PathLike)) else bytes(model)
+    # A GLB that needs no other files is sent as it is.
+    if glb is None or data[:4] == b"glTF":
+        return name if glb is None else f"{Path(name).stem}.glb", data, None
+    return f"{Path(name).stem}.glb", glb, None
 
 
 def _ply(vertices: np.ndarray, triangles: np.ndarray) -> bytes:

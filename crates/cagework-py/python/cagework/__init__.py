@@ -62,15 +62,14 @@ __all__ = [
 def show(model: Any, cage: Cage, weights: Any = None, report: dict[str, Any] | None = None, **options: Any) -> Any:
     """Draws a model in its cage in a notebook: show(model, cage, weights=None, report=None, *, theme="auto", height=400) -> widget
 
-    model: path of a file or its bytes, with its materials; or a mesh, which is (vertices, triangles) or an object with vertices and
-    faces. weights and report: the result of bind; without them, the model is bound here. theme: "auto", "dark" or "light"; height:
+    model: anything that read_model takes; a file is drawn with its materials. weights and report: the result of bind; without them, the model is bound here. theme: "auto", "dark" or "light"; height:
     CSS pixels.
 
     The widget's pose is the cage's vertices, [n_cage, 3] float64, object units. Drag vertices in the notebook, or assign a pose.
     widget.observe(function, "pose") calls a function at each change. The array is read-only: copy it to change numbers. deformed: the
     model's vertices in this pose.
 
-    Needs `pip install 'cagework[notebook]'`; raises ImportError without it, ArrayError, and the exceptions of bind and read_model.
+    Needs the package cagework-notebook; raises ImportError without it, which says how to install it, ArrayError, and the exceptions of bind and read_model.
 
     >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
     >>> widget = cw.show(mesh, cage, *cw.bind(mesh.vertices, cage, grid=24))
@@ -81,5 +80,8 @@ def show(model: Any, cage: Cage, weights: Any = None, report: dict[str, Any] | N
     try:
         from cagework_notebook import show as draw
     except ModuleNotFoundError as error:
-        raise ImportError(f"cagework.show needs the notebook widget ({error}): pip install 'cagework[notebook]'") from error
+        raise ImportError(
+            f"cagework.show needs the package cagework-notebook ({error}), which is not on PyPI yet. In a clone of "
+            "https://github.com/cagework/cagework, run `cargo xtask notebook-wheel`, then `pip install target/notebook/*.whl`"
+        ) from error
     return draw(model, cage, weights, report, **options)

@@ -1,6 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, TypedDict, final
+from typing import Any, Literal, Protocol, TypedDict, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +10,50 @@ from typing_extensions import Unpack
 __version__: str
 
 _Faces = ArrayLike | Sequence[ArrayLike]
-_Progress = Callable[[float], object] | None
-_Model = str | PathLike[str] | bytes | bytearray | memoryview
+
+class _Bar(Protocol):
+    n: Any
+    total: Any
+    def update(self, n: Any = ...) -> Any: ...
+    def refresh(self) -> Any: ...
+
+class _Readable(Protocol):
+    def read(self) -> bytes: ...
+
+class _VerticesFaces(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+class _VerticesTriangles(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def triangles(self) -> Any: ...
+
+class _PointsFaces(Protocol):
+    @property
+    def points(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+class _PointsCells(Protocol):
+    @property
+    def points(self) -> Any: ...
+    @property
+    def cells_dict(self) -> Any: ...
+
+class _Scene(Protocol):
+    @property
+    def geometry(self) -> Any: ...
+    def to_mesh(self) -> Any: ...
+
+_Progress = Callable[[float], object] | _Bar | None
+_File = str | PathLike[str] | bytes | bytearray | memoryview | _Readable
+_Mesh = _VerticesFaces | _VerticesTriangles | _PointsFaces | _PointsCells | _Scene | tuple[ArrayLike, _Faces]
+_Model = _File | _Mesh
+_Points = ArrayLike | _Model
 
 class BindOptions(TypedDict, total=False):
     grid: int | Literal["auto"]
@@ -35,17 +77,11 @@ class CageOptions(TypedDict, total=False):
     voxels: int
     smooth: int
 
-class _Mesh(Protocol):
-    @property
-    def vertices(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
-
 @final
 class Cage:
     def __new__(cls, vertices: ArrayLike, faces: _Faces, smooth: int = 0) -> Cage: ...
     @staticmethod
-    def load(path: str | PathLike[str], smooth: int = 0) -> Cage: ...
+    def load(path: _Model, smooth: int = 0) -> Cage: ...
     def save(self, path: str | PathLike[str], vertices: ArrayLike | None = None) -> None: ...
     @property
     def vertices(self) -> NDArray[np.float64]: ...
@@ -66,7 +102,9 @@ class Cage:
 
 @final
 class Field:
-    def __new__(cls, cage: Cage, posed: ArrayLike, *, cells: int = 64, **options: Unpack[BindOptions]) -> Field: ...
+    def __new__(
+        cls, cage: Cage, posed: ArrayLike, *, cells: int = 64, progress: _Progress = None, **options: Unpack[BindOptions]
+    ) -> Field: ...
     def pose(self, posed: ArrayLike) -> Field: ...
     def map(self, points: ArrayLike) -> NDArray[np.float32] | NDArray[np.float64]: ...
     def inverse(self, points: ArrayLike) -> NDArray[np.float32] | NDArray[np.float64]: ...
@@ -75,7 +113,7 @@ class Field:
 
 @final
 class Splats:
-    def __new__(cls, path: str | PathLike[str]) -> Splats: ...
+    def __new__(cls, path: _Model) -> Splats: ...
     def __len__(self) -> int: ...
     @property
     def positions(self) -> NDArray[np.float32] | NDArray[np.float64]: ...
@@ -97,21 +135,21 @@ class Splats:
     def save(self, path: str | PathLike[str]) -> None: ...
 
 def generate_cage(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
+    vertices: _Points | list[_Model],
+    triangles: ArrayLike | None = None,
     *,
     rig: _Model | list[_Model] | None = None,
     progress: _Progress = None,
     **options: Unpack[CageOptions],
 ) -> Cage: ...
 def check_cage(
-    cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int | Literal["auto"] = "auto", smooth: int | None = None
+    cage: Cage | _VerticesFaces, points: _Points | None = None, grid: int | Literal["auto"] = "auto", smooth: int | None = None
 ) -> list[dict[str, Any]]: ...
 def bind(
-    points: ArrayLike, cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
+    points: _Points, cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
 ) -> tuple[csr_array, dict[str, Any]]: ...
 def bind_many(
-    models: Sequence[ArrayLike], cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
+    models: Sequence[_Points], cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
 ) -> list[tuple[csr_array, dict[str, Any]]]: ...
 def deform(
     weights: Any, posed: ArrayLike, report: dict[str, Any] | None = None
@@ -129,6 +167,7 @@ def pull(
     start: ArrayLike | None = None,
     reach: float | None = None,
     relax: float = 0.5,
+    progress: _Progress = None,
     **options: Unpack[BindOptions],
 ) -> NDArray[np.float64]: ...
 def humanoid_bones(model: _Model, bones: dict[str, str] | None = None) -> dict[str, str]: ...
@@ -146,6 +185,10 @@ def read_model(
     model: _Model | list[_Model], states: bool = False, clip: str | None = None
 ) -> tuple[NDArray[np.float32] | NDArray[np.float64], NDArray[np.int32]]: ...
 def to_glb(model: _Model) -> bytes | None: ...
+def defaults() -> list[dict[str, Any]]: ...
+def restored_cage(vertices: ArrayLike, faces: _Faces, smooth: int, made: str) -> Cage: ...
+def restored_splats(arrays: list[bytes]) -> Splats: ...
+@overload
 def reshape(
     model: _Model,
     cage: Cage,
@@ -162,8 +205,31 @@ def reshape(
     times: Sequence[float] | None = None,
     interpolation: Literal["step", "linear", "cubic"] | None = None,
     static: bool = False,
+    each: Callable[[int, Any], object] | None = None,
+    progress: _Progress = None,
     **options: Unpack[BindOptions],
 ) -> bytes: ...
+@overload
+def reshape(
+    model: list[_Model],
+    cage: Cage,
+    posed: ArrayLike | dict[str, ArrayLike],
+    *,
+    joints: Literal["follow", "stay", "turn"] = "follow",
+    keep_travel: bool = False,
+    ground: bool = False,
+    feet: Literal["free", "lock"] = "free",
+    rigid: Sequence[str] = [],
+    mask: dict[str, float] | None = None,
+    skeleton: _Model | None = None,
+    expressions: bool = False,
+    times: Sequence[float] | None = None,
+    interpolation: Literal["step", "linear", "cubic"] | None = None,
+    static: bool = False,
+    each: Callable[[int, Any], object] | None = None,
+    progress: _Progress = None,
+    **options: Unpack[BindOptions],
+) -> list[bytes]: ...
 def transfer(
     body: _Model, clothes: _Model, *, push_out: float | None = None, memory_limit: int = ...
 ) -> tuple[bytes, dict[str, Any]]: ...
