@@ -81,7 +81,7 @@ test("after the first visit everything works without a network", async ({ page, 
   await bound(page);
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   await page.getByRole("button", { name: "Take the tour" }).click();
-  await expect(page.getByText("What a cage does")).toBeVisible();
+  await expect(page.getByRole("heading", { name: "Pull the model" })).toBeVisible();
   await bound(page);
   await page.reload();
   await bound(page);
@@ -107,7 +107,7 @@ test("an open tab keeps its version and offers the new one", async ({ page, cont
   await test.step("a tab of the old version still has all its files", async () => {
     await page.getByRole("button", { name: "Model", exact: false }).first().click();
     await page.getByRole("button", { name: "Take the tour" }).click();
-    await expect(page.getByText("What a cage does")).toBeVisible();
+    await expect(page.getByRole("heading", { name: "Pull the model" })).toBeVisible();
     await page.close();
   });
   await test.step("they are deleted after it is closed", async () => {
