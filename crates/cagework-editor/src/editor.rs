@@ -589,11 +589,11 @@ impl Editor {
         Ok(file)
     }
 
-    /// As [`Self::write_project`], for a file of at most `limit` bytes, without a copy of the models. `write` is called
-    /// once.
+    /// As [`Self::write_project`], for a file of at most `limit` bytes. `write` is called once with the pieces of the file,
+    /// which borrow the models.
     ///
     /// # Errors
-    /// If no model is open, or the file would be too large.
+    /// If no model is open, or the file would be larger than `limit`.
     pub fn write_project_in_pieces(
         &self,
         settings: &str,

@@ -85,9 +85,8 @@ pub fn write_project(
     Ok(file)
 }
 
-/// As [`write_project`], for a file of at most `limit` bytes, without a copy of the models.
-///
-/// `write` is called once.
+/// As [`write_project`], for a file of at most `limit` bytes. `write` is called once with the pieces of the file, which
+/// borrow the models that are stored as they were read.
 ///
 /// # Errors
 /// As [`write_project`], and [`WriteError::Limit`].

@@ -48,6 +48,7 @@ export const solvers = (grid: number): Partial<BindOptions>[] =>
 const RAT = { sample: "rat", turn: [90, 30] } as const;
 const HUMANOID = { sample: "humanoid", step: "pose", binds: [{}], turn: [50, 15] } as const;
 
+/** Stops of the tour *First steps*. */
 const FIRST = {
   pull: { ...RAT, step: "pose", binds: [{}] },
   mirror: HUMANOID,
@@ -56,6 +57,7 @@ const FIRST = {
   export: { ...HUMANOID, step: "export", pose: 0 },
 } satisfies Record<string, Stop>;
 
+/** Stops of the tour *How it works*. */
 function howStops(gpu: boolean) {
   return {
     cage: { ...RAT, step: "pose", binds: [{}] },

@@ -40,7 +40,7 @@ const KNOWN_EXTENSIONS: [&str; 12] = [
     PROJECT_EXTENSION,
 ];
 
-/// Bytes that are written one after the other. A file in pieces is not copied before all of it is known.
+/// Consecutive parts of a file. They borrow the bytes of the model, so the size of a file is known before it is copied.
 pub(crate) type Pieces<'a> = Vec<Cow<'a, [u8]>>;
 
 /// The buffer views of a document that is being written.
