@@ -67,7 +67,8 @@ export function shapeFormatsOf(model: ModelInfo | null): readonly ShapeFormat[] 
 /** The format in which the shape of the open model is exported. */
 export function shapeFormatOf({ model, shapeFormat }: AppState): ShapeFormat {
   const formats = shapeFormatsOf(model);
-  return formats.includes(shapeFormat) ? shapeFormat : (formats[0] ?? shapeFormat);
+  const wanted = [shapeFormat, model?.format].map((one) => formats.find((format) => format === one));
+  return wanted.find((format) => format !== undefined) ?? formats[0] ?? "obj";
 }
 
 /** Number of vertices and inner controls of the cage. */

@@ -19,7 +19,7 @@ import {
   CAGE_DEFAULTS,
   RIG_DEFAULTS,
   SCENE_DEFAULTS,
-  SHAPE_FORMATS,
+  type SHAPE_FORMATS,
   type SPLAT_FORMATS,
   VIEW_DEFAULTS,
 } from "./defaults";
@@ -149,8 +149,8 @@ export const MODEL_STATE = {
    * Identifier of the only model to export; "zip" to export all in one archive, null to export all as separate files.
    */
   exportOnly: null as number | "zip" | null,
-  /** Format of exported shapes, if the model can have it; see `shapeFormatOf`. */
-  shapeFormat: SHAPE_FORMATS[0] as ShapeFormat,
+  /** Format of exported shapes, if the model can have it; null: that of the model's file. See `shapeFormatOf`. */
+  shapeFormat: null as ShapeFormat | null,
   /** Whether an exported shape is the shown frame of a clip or the rest shape. */
   shapeMoment: "frame" as "frame" | "rest",
   /** Picture pixels per CSS pixel of the view. */

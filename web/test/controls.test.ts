@@ -28,5 +28,6 @@ it("a shape is exported in the chosen format if its model can have it, otherwise
   expect(formatOf({})).toBe("stl");
   // STL stores only faces.
   expect(formatOf({ points: 9 })).toBe("obj");
-  expect(formatOf({ splats: 9 })).toBe("ply");
+  expect(formatOf({ splats: 9, format: "gltf" })).toBe("ply");
+  expect(formatOf({ splats: 9, format: "spz" })).toBe("spz");
 });

@@ -266,6 +266,7 @@ export function createFake(): Fake {
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
     movesAlone: () => false,
+    lostIn: () => [],
     reachCircle: () => new Float32Array(),
     axes: () => Float32Array.of(0.8, -0.2, 0.5, 0, 0.9, 0.3, -0.5, -0.3, 0.8),
     estimateUpdates: () => 0,

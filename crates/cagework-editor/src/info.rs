@@ -3,7 +3,7 @@
 use cagework_core::cage::CageNotice;
 use cagework_core::splats::Splats;
 use cagework_core::{Bounds, ControlSet};
-use cagework_io::{Model, ModelFormat, UpAxis, lies_on_back};
+use cagework_io::{Model, ModelFormat, UpAxis, lies_on_back, up_of_floor};
 use serde::Serialize;
 
 use crate::controls::{CageControls, RestCage};
@@ -42,8 +42,8 @@ pub struct ModelInfo {
     /// Whether a model is a VRM.
     vrm: bool,
     bounds: Bounds,
-    /// Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
-    /// other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
+    /// Another up axis that the file probably has: z for a 3MF file and for a mesh that seems to lie on its back. Null if
+    /// there is none, if the up axis is not y, and for captures, which are turned when they are opened.
     suggested_up: Option<UpAxis>,
     notices: Vec<String>,
     /// Properties of each model.
@@ -87,14 +87,16 @@ impl ModelInfo {
 }
 
 fn suggested_up(models: &Models, first: &Model) -> Option<UpAxis> {
-    let up = if first.splats().is_some() || first.format() == ModelFormat::ThreeMf {
-        first.format().usual_up()
-    } else if lies_on_back(models.positions()) {
-        UpAxis::Z
-    } else {
-        UpAxis::Y
-    };
-    (first.up() == UpAxis::Y && up != UpAxis::Y).then_some(up)
+    let is_z = first.format() == ModelFormat::ThreeMf || lies_on_back(models.positions());
+    (first.splats().is_none() && first.up() == UpAxis::Y && is_z).then_some(UpAxis::Z)
+}
+
+/// The up axis that the file of a capture probably has: by its floor, or the conventional one of the format. `None` for
+/// models that are not captures. Call it before the up axis is set.
+#[must_use]
+pub fn up_of_capture(model: &Model) -> Option<UpAxis> {
+    let splats = model.splats()?;
+    Some(up_of_floor(splats).unwrap_or_else(|| model.format().usual_up()))
 }
 
 /// Properties and options of one of the models in the cage.

@@ -41,7 +41,7 @@ pub use error::EditError;
 pub use export::Exported;
 pub use history::HISTORY_BYTES;
 pub use humanoid::{BoneView, HumanoidInfo};
-pub use info::{CageState, ModelInfo};
+pub use info::{CageState, ModelInfo, up_of_capture};
 pub use joints::JointDots;
 pub use models::{Member, MemberSettings, Models, NewModel, PartOptions};
 pub use options::{BRUSH, PROPORTIONAL_RADIUS, RigOptions, Tools};

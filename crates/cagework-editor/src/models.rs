@@ -382,6 +382,13 @@ impl Models {
         self.iter().next().map_or_else(UpAxis::default, |member| member.model.up())
     }
 
+    /// Whether the first model faces the negative z axis, as VRM 0 prescribes, instead of the positive one.
+    #[must_use]
+    pub fn faces_negative_z(&self) -> bool {
+        let vrm = self.iter().next().and_then(|member| member.model.vrm());
+        vrm.is_some_and(|vrm| vrm.version.starts_with('0'))
+    }
+
     /// Ranges of the triangles of hidden models in the joined mesh.
     #[must_use]
     pub fn hidden(&self) -> Vec<Range<u32>> {

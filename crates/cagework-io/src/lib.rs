@@ -84,7 +84,7 @@ pub use timeline::{
 pub use transfer::{
     Penetration, TargetReport, TransferError, TransferOptions, TransferReport, transfer_report,
 };
-pub use up::{UpAxis, lies_on_back};
+pub use up::{UpAxis, lies_on_back, up_of_floor};
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use cagework_core::splats::Splats;
 use cagework_core::{Bounds, PolygonMesh, choice};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
@@ -102,9 +103,106 @@ pub fn lies_on_back(positions: &[Vec3]) -> bool {
         && z >= MIN_FLAT_SIDE_RATIO * y
 }
 
+/// Number of slabs into which a capture is divided along an axis.
+const SLABS: usize = 64;
+/// Number of slabs at each end in which a floor can lie.
+const FLOOR_SLABS: usize = 8;
+/// Smallest cosine of the angle between an axis and the normal of a splat that counts as a part of a floor.
+const MIN_FLOOR_COSINE: f32 = 0.9;
+/// Minimum area of a floor: as a multiple of the mean of all slabs, and as a fraction of all splats.
+const MIN_FLOOR_RATIO: f32 = 10.0;
+const MIN_FLOOR_SHARE: f32 = 0.02;
+/// Minimum area of a floor as a multiple of the next largest floor, such as a ceiling.
+const MIN_FLOOR_LEAD: f32 = 1.5;
+/// Fraction of the splats at each end of an axis that are ignored, because captures contain stray splats.
+const STRAY_SHARE: f32 = 0.01;
+
+/// Finds the up axis of a capture by its floor, a thin slab at one end of an axis with many flat splats that are
+/// perpendicular to the axis. `None` if no slab stands out. This is a heuristic. `splats` in the axes of the file.
+#[must_use]
+pub fn up_of_floor(splats: &Splats) -> Option<UpAxis> {
+    let area = |i: usize| {
+        let [x, y, z] = splats.scales[i].to_array();
+        splats.opacities[i] * (x * y).max(y * z).max(z * x)
+    };
+    let total: f32 = (0..splats.len()).map(area).sum();
+    let mut floors: Vec<(f32, Option<UpAxis>)> = Vec::new();
+    for (axis, [at_low, at_high]) in
+        [(1, [Some(UpAxis::Y), Some(UpAxis::YDown)]), (2, [Some(UpAxis::Z), None])]
+    {
+        let mut sorted: Vec<f32> = splats.positions.iter().map(|p| p[axis]).collect();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let stray = (STRAY_SHARE * sorted.len() as f32) as usize;
+        let (low, high) = (*sorted.get(stray)?, *sorted.get(sorted.len() - 1 - stray)?);
+        let mut slabs = [0.0; SLABS];
+        for (i, (p, rotation)) in splats.positions.iter().zip(&splats.rotations).enumerate() {
+            let normal = *rotation * Vec3::AXES[splats.scales[i].min_position()];
+            if normal[axis].abs() >= MIN_FLOOR_COSINE {
+                let slab = SLABS as f32 * (p[axis] - low) / (high - low).max(f32::MIN_POSITIVE);
+                slabs[(slab.max(0.0) as usize).min(SLABS - 1)] += area(i);
+            }
+        }
+        let mean = slabs.iter().sum::<f32>() / SLABS as f32;
+        let largest = |slabs: &[f32]| slabs.iter().copied().fold(0.0, f32::max);
+        for (floor, up) in
+            [(largest(&slabs[..FLOOR_SLABS]), at_low), (largest(&slabs[SLABS - FLOOR_SLABS..]), at_high)]
+        {
+            if floor >= MIN_FLOOR_RATIO * mean && floor >= MIN_FLOOR_SHARE * total && floor > 0.0 {
+                floors.push((floor, up));
+            }
+        }
+    }
+    floors.sort_by(|a, b| b.0.total_cmp(&a.0));
+    match floors[..] {
+        [(_, up)] => up,
+        [(largest, up), (next, _), ..] if largest >= MIN_FLOOR_LEAD * next => up,
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
+
+    /// A ball of round splats above a floor of flat splats at y = 0.
+    fn ball_on_floor() -> Splats {
+        let spread = |i: u16, n: f32| (f32::from(i) * n).fract();
+        let ball = (0..2000_u16).map(|i| {
+            let (z, angle) =
+                (2.0 * spread(i, 0.754_877_7) - 1.0, std::f32::consts::TAU * spread(i, 0.569_840_3));
+            let across = (1.0 - z * z).sqrt();
+            (
+                0.4 * Vec3::new(across * angle.cos(), across * angle.sin(), z) + 0.5 * Vec3::Y,
+                Vec3::splat(0.02),
+            )
+        });
+        let floor = (0..500_u16).map(|i| {
+            let (x, z) = (spread(i, 0.754_877_7) - 0.5, spread(i, 0.569_840_3) - 0.5);
+            (Vec3::new(x, 0.001 * f32::from(i % 5), z), Vec3::new(0.03, 0.001, 0.03))
+        });
+        let (positions, scales): (Vec<Vec3>, Vec<Vec3>) = ball.chain(floor).unzip();
+        let n = positions.len();
+        let (rotations, opacities) = (vec![Quat::IDENTITY; n], vec![0.9; n]);
+        Splats { positions, scales, rotations, opacities, colors: vec![Vec3::ONE; n], ..Splats::default() }
+    }
+
+    #[test]
+    fn floor_of_a_capture_tells_its_up_axis() {
+        let standing = ball_on_floor();
+        assert_eq!(up_of_floor(&standing), Some(UpAxis::Y));
+        let turned = |up: UpAxis| standing.rotated(Quat::from_mat4(&up.turn()).inverse());
+        for up in [UpAxis::Z, UpAxis::YDown] {
+            assert_eq!(up_of_floor(&turned(up)), Some(up));
+        }
+        // A floor along x has no axis, and neither does a ball alone.
+        assert_eq!(up_of_floor(&standing.rotated(Quat::from_rotation_z(1.0))), None);
+        let mut ball = standing;
+        ball.opacities[2000..].fill(0.0);
+        assert_eq!(up_of_floor(&ball), None);
+        assert_eq!(up_of_floor(&Splats::default()), None);
+    }
 
     /// A cone of height 1 on the ground z = 0, with a base of radius 0.25.
     fn cone() -> Vec<Vec3> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cagework_core::words::{size_rounded_down, size_rounded_up};
 use cagework_core::{PolygonMesh, TriMesh};
-use cagework_editor::{DocumentSettings, MemberSettings};
+use cagework_editor::{DocumentSettings, MemberSettings, up_of_capture};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{
     Look, LookAlpha, LookWrap, Model, ModelFormat, RestoreError, Store, StoredArrays, TexturePlan, UpAxis,
@@ -355,6 +355,13 @@ impl LoadedModel {
         self.cage.iter_mut().for_each(|cage| turn(&mut cage.positions));
         self.poses.iter_mut().for_each(|(_, positions)| turn(positions));
         self.more.iter_mut().for_each(|next| next.turn_to(up));
+    }
+
+    /// Turns a capture to the up axis that its file probably has.
+    pub(crate) fn stand_up(&mut self) {
+        if let Some(up) = up_of_capture(&self.model) {
+            self.turn_to(up);
+        }
     }
 
     /// Settings of this model in its project.

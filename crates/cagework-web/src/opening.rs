@@ -36,6 +36,11 @@ pub(crate) struct PoseArrays {
 }
 
 impl OpenContents {
+    /// Whether the models are neither a sample nor those of a project.
+    pub(crate) fn is_new_file(&self) -> bool {
+        self.sample.is_none() && self.settings.is_none()
+    }
+
     /// Converts the contents for the editor. Also returns the settings of the project. `first`: the first model.
     pub(crate) fn read(self, first: &LoadedModel) -> Answer<(Contents, DocumentSettings)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();

@@ -5,7 +5,7 @@ import { SHAPE_FORMATS } from "../../src/defaults";
 /** Names that no language changes: product, formats and units. */
 const NAMES = [
   "Cagework",
-  ...SHAPE_FORMATS.map((format) => format.toUpperCase()),
+  ...["glb", ...SHAPE_FORMATS].map((format) => format.toUpperCase()),
   "byte",
   "ms",
   "kB",

@@ -69,6 +69,8 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
       files.push({ name, bytes: own[kind](member.id) as Uint8Array<ArrayBuffer> });
       for (const notice of engine().rigNotices()) notices.add(notice);
     }
+    // The panel shows what a format loses before the export.
+    if (kind === "shape") for (const lost of engine().lostIn(format())) notices.delete(lost);
     const [first] = files;
     if (exportOnly === "zip" && first && files.length > 1) {
       const name = first.name.replace(/\.\w+$/, ".zip");

@@ -81,12 +81,12 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
-    const { suggestedUp: up, splats } = opened.model;
-    // For a capture in a project, the user has chosen the axis before saving: do not suggest another.
-    if (up !== null && sample === null && !(splats > 0 && opened.settings !== null)) {
-      const [said, label] = splats > 0 ? T.model.upsideDown : T.model.lies;
-      ctx.tell.say(said, { label, run: () => void actions.turn(up) });
-    }
+    const { suggestedUp, splats, up } = opened.model;
+    const offerTurn = ([said, label]: readonly [string, string], to: UpAxis) =>
+      ctx.tell.say(said, { label, run: () => void actions.turn(to) });
+    if (suggestedUp !== null && sample === null) offerTurn(T.model.lies, suggestedUp);
+    const isNewCapture = splats > 0 && sample === null && opened.settings === null;
+    if (isNewCapture && up !== "y") offerTurn(T.model.turnedUp, "y");
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
     prepared = prepare(cageFiles, sample !== null, opened.settings !== null);
   };

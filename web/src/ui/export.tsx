@@ -13,6 +13,7 @@ import {
   shapeFormatsOf,
 } from "../derived";
 import type { AppState } from "../state";
+import { sentence } from "../strings";
 import { T } from "../words";
 import { RigChoices } from "./clips";
 import { Fold, fieldsOf, Head, Segments, Select, Toggle } from "./controls";
@@ -24,6 +25,13 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["shape", "shape"],
   ["picture", "image"],
   ["project", "save"],
+];
+/** For a capture, a file of its own format comes first. */
+const CAPTURE_ITEMS: typeof ITEMS = [
+  ["shape", "shape"],
+  ["picture", "image"],
+  ["project", "save"],
+  ["glb", "model"],
 ];
 /** Exports that most people never use. */
 const MORE_ITEMS: readonly (readonly [ExportKind, IconName])[] = [
@@ -64,7 +72,7 @@ export function ExportPanel({ app }: { app: App }) {
     <div class="stack loose">
       <Head title={T.exports.title} />
       <Which app={app} />
-      {list(ITEMS)}
+      {list(isCapture(model) ? CAPTURE_ITEMS : ITEMS)}
       <Fold title={T.exports.more}>{list(MORE_ITEMS)}</Fold>
       <Privacy />
     </div>
@@ -157,6 +165,7 @@ function wordsOf(kind: ExportKind, model: ModelInfo | null): readonly string[] {
 function ShapeFormat({ app }: { app: App }) {
   const state = app.store.get();
   const { onChange } = fieldsOf(state, app.store.set)("shapeFormat");
+  const format = shapeFormatOf(state);
   return (
     <div class="export-option stack tight">
       {state.clip.clip !== null && (
@@ -170,9 +179,17 @@ function ShapeFormat({ app }: { app: App }) {
         label={T.exports.format}
         values={shapeFormatsOf(state.model)}
         labels={(format) => format.toUpperCase()}
-        value={shapeFormatOf(state)}
+        value={format}
         onChange={onChange}
       />
+      {app.ctx
+        .engine()
+        .lostIn(format)
+        .map((lost) => (
+          <p key={lost} class="hint" lang="en">
+            {sentence(lost)}
+          </p>
+        ))}
     </div>
   );
 }

@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { cageBroken, fixOf, hasUnmadeCage } from "../derived";
+import { cageBroken, fixOf, hasUnmadeCage, isCapture, shapeFormatOf } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
@@ -47,14 +47,18 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
         primary: { label: T.panel.export, icon: "export", run: () => app.go("export") },
         second: { label: T.panel.savePose, icon: "plus", run: () => app.run("savePose") },
       };
-    case "export":
+    case "export": {
+      const kind = isCapture(state.model) ? "shape" : "glb";
+      const format = kind === "glb" ? kind : shapeFormatOf(state);
+      const label = (state.model?.members.length ?? 0) > 1 ? T.panel.downloadAs : T.panel.download;
       return {
         primary: {
-          label: (state.model?.members.length ?? 0) > 1 ? T.panel.downloadAs : T.panel.download,
+          label: label(format.toUpperCase()),
           icon: "download",
-          run: () => void app.exports.save("glb"),
+          run: () => void app.exports.save(kind),
         },
       };
+    }
     default:
       return state.step satisfies never;
   }

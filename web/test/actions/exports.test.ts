@@ -83,6 +83,7 @@ it("files are named after the model and their size is shown", async () => {
   teach({
     exportGlb: () => new Uint8Array(2000),
     rigNotices: () => ["3 of 4 joints moved"],
+    lostIn: () => ["the stl file does not keep: colours"],
     exportCage: () => Uint8Array.of(1),
     exportShape: (_id: number, format: string, frame: boolean) =>
       new TextEncoder().encode(format + (frame ? "!" : "")),

@@ -58,6 +58,20 @@ it("asks whether to stand a model up that seems to lie on its back", async () =>
   expect(asked.at(-1)).toMatchObject({ kind: "turn", input: { up: "z" } });
 });
 
+it("says that a capture was turned upright, and offers to turn it back", async () => {
+  const { files, asked, said, offers } = page();
+  const opened = files.openFiles([file("plant.ply")]);
+  await settled();
+  asked[0]?.resolve({});
+  await settled();
+  asked[1]?.resolve({ ...OPENED_FILE, model: { ...MODEL, splats: 9, up: "y_down" } });
+  await opened;
+  expect(said).toContain("This capture was turned upright.");
+  offers()[0]?.run();
+  await settled();
+  expect(asked.at(-1)).toMatchObject({ kind: "turn", input: { up: "y" } });
+});
+
 it("a step that the user chooses while the cage is made stays", async () => {
   const { files, asked, store, steps } = page(() => void store.set({ step: "model" }));
   const opened = files.openFiles([file("cube.obj")]);

@@ -38,6 +38,24 @@ fn names(models: &Models) -> Vec<&str> {
     models.iter().map(|member| member.model.name.as_str()).collect()
 }
 
+/// VRM 1 (VRMC_vrm) prescribes that a model faces +z, as glTF does; VRM 0 prescribes -z.
+#[test]
+fn only_vrm_0_faces_negative_z() {
+    let faces_back = |extensions: &str| {
+        let text = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "extensions": {{{extensions}}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
+                "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}], "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+                "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}}],
+                "buffers": [{{"byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}]}}"#
+        );
+        let mut models = Models::default();
+        models.add([(Model::read("a.gltf", text.as_bytes(), &mut |_| None).unwrap(), None)]);
+        models.faces_negative_z()
+    };
+    assert!(faces_back(r#""VRM": {"specVersion": "0.0"}"#));
+    assert!(!faces_back(r#""VRMC_vrm": {"specVersion": "1.0"}"#) && !faces_back(""));
+}
+
 #[test]
 fn rigs_are_read_once() {
     let mut models = three();

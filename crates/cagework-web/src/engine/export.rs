@@ -87,6 +87,22 @@ impl Engine {
         })
     }
 
+    /// Sentences that list what the files of [`Self::export_shape`] lose, one per kind of model.
+    #[wasm_bindgen(js_name = lostIn)]
+    pub fn lost_in(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
+    ) -> Answer<Vec<String>> {
+        let format = decode(format)?;
+        Ok(self.read(|state| {
+            let mut lost: Vec<String> =
+                state.models().iter().filter_map(|member| member.model.lost_in(format)).collect();
+            lost.sort_unstable();
+            lost.dedup();
+            lost
+        }))
+    }
+
     /// Returns notices from the last export, one sentence each: changes of the rig, and data that the file format
     /// loses. Clears them, so that each is returned once.
     #[wasm_bindgen(js_name = rigNotices)]

@@ -20,6 +20,7 @@ mod slice;
 mod walk;
 
 use std::cell::RefCell;
+use std::f32::consts::PI;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -28,6 +29,7 @@ use cagework_core::Coordinates;
 use cagework_editor::BoundModels;
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, check_layers};
+use glam::Vec2;
 use js_sys::Function;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -83,7 +85,7 @@ impl Engine {
     }
 
     /// Replaces the open models, cage and poses, and clears the history. Consumes the JavaScript handles of the models.
-    /// Returns notices for the user, one sentence each.
+    /// Turns a capture upright, unless it belongs to a sample or a project. Returns notices for the user, one sentence each.
     ///
     /// # Errors
     /// If the GPU runs out of memory, or cannot draw the models' transparent layers fast enough. The previous models
@@ -101,6 +103,9 @@ impl Engine {
         let Some(first) = models.first_mut() else {
             return Err(Fault::missing("model", "open one first"));
         };
+        if contents.is_new_file() {
+            first.stand_up();
+        }
         let (contents, settings) = contents.read(first)?;
         let mut notices = Vec::new();
         let (up, origin) = (first.model.up(), first.model.origin());
@@ -142,6 +147,9 @@ impl Engine {
                 state.cache.clear();
                 state.has_uploaded_mesh();
                 state.camera = Camera::default();
+                if state.models().faces_negative_z() {
+                    state.camera.orbit(Vec2::new(PI, 0.0));
+                }
                 state.fit_camera();
                 state.frame_all();
                 notices.extend(state.editor.take_pose(&settings).err().map(str::to_owned));

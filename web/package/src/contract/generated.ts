@@ -915,8 +915,8 @@ rigged: boolean,
  */
 vrm: boolean, bounds: Bounds,
 /**
- * Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
- * other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
+ * Another up axis that the file probably has: z for a 3MF file and for a mesh that seems to lie on its back. Null if
+ * there is none, if the up axis is not y, and for captures, which are turned when they are opened.
  */
 suggestedUp: UpAxis | null, notices: Array<string>,
 /**

@@ -26,8 +26,8 @@ export const panel = {
   bindModel: "Bind the model",
   export: "Export",
   savePose: "Save pose",
-  download: "Download the GLB",
-  downloadAs: "Download as GLB",
+  download: (format: string) => `Download the ${format}`,
+  downloadAs: (format: string) => `Download as ${format}`,
   makeCage: "Make a cage",
   newCage: "Make a new cage",
 };

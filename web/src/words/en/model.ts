@@ -22,7 +22,7 @@ export const model = {
   upZ: "For models that otherwise lie on their backs",
   upYDown: "Captures often have y down",
   lies: ["The model seems to lie on its back.", "Stand it up"] as const,
-  upsideDown: ["Captures in this format are usually upside down.", "Turn it over"] as const,
+  turnedUp: ["This capture was turned upright.", "Turn it back"] as const,
   licences: "Licences",
   isOpen: "The model that is open",
   count: {
