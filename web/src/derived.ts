@@ -41,6 +41,13 @@ export function fixOf({ code, severity, fixes: [best] }: Problem): ProblemFix | 
   return best ?? (needsNewCage ? { kind: "regenerate" } : undefined);
 }
 
+/** The best fix of the first fault that forbids a bind, and the number of places it mends; undefined without a fault. */
+export function neededFix(state: AppState): { fix: ProblemFix; count: number } | undefined {
+  const found = cageBroken(state) ? state.check?.find(({ severity }) => severity === "error") : undefined;
+  const fix = found && fixOf(found);
+  return fix && { fix, count: found.count };
+}
+
 /** Scene options as drawn: faults are marked only in step Cage, or if they prevent a bind. */
 export function drawn(state: AppState): SceneOptions {
   const { scene, step, rigOptions } = state;

@@ -4,7 +4,7 @@ import { describe, expect, it } from "vitest";
 import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
 import { nextAmount } from "../src/amount";
-import type { BindReport, CageState } from "../src/contract";
+import type { BindReport, CageState, Problem } from "../src/contract";
 import { drawn } from "../src/derived";
 import { rectangle } from "../src/input/pointer";
 import { type AppState, INITIAL_STATE, type StepName } from "../src/state";
@@ -85,6 +85,21 @@ describe("hints", () => {
     const selected = { count: 1, last: 0, center: null };
     expect(hint({ selected }, { pull: false, gizmo: "move" })).toMatch(/gizmo.*arrow keys/);
     expect(hint({ editingRest: true }, { cage: false })).not.toMatch(/Drag a handle/);
+  });
+  it("name the repair that a cage needs before a bind", () => {
+    const check: Problem[] = [
+      {
+        code: "open_edge",
+        severity: "error",
+        count: 4,
+        message: "",
+        places: { edges: [], faces: [], vertices: [], points: [] },
+        fixes: [{ kind: "repair", repair: "fill_holes" }],
+      },
+    ];
+    expect(hint({ bound: false, cage: { ...cage, usable: false }, check }, {})).toBe(
+      "Before the model can be bound, the cage needs “Fill the holes”.",
+    );
   });
   it("mention no wheel, mouse button or key on a phone", () => {
     const states: Partial<AppState>[] = [

@@ -5,13 +5,11 @@ use cagework_core::PolygonMesh;
 use cagework_gpu::render::Marks;
 use glam::Vec3;
 
-/// Creates the marks of faults, except of those with severity `Note`. `positions`: the posed cage. If the cage is a draft,
-/// the edges of all its faces are marked.
-pub(crate) fn marks(problems: &[Problem], mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
+/// Creates the marks of faults, except of those with severity `Note`. `positions`: the posed cage.
+pub(crate) fn marks(problems: &[Problem], mesh: &PolygonMesh, positions: &[Vec3]) -> Marks {
     let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
     let mut marks = Marks::default();
-    // A draft is not drawn as a cage: mark the edges of all its faces.
-    let mut faces: Vec<&Vec<u32>> = mesh.faces.iter().filter(|_| is_draft).collect();
+    let mut faces: Vec<&Vec<u32>> = Vec::new();
     for Problem { code, places, .. } in problems.iter().filter(|p| p.severity != Severity::Note) {
         if *code == Code::ModelOutside {
             marks.mesh_vertices.extend(&places.vertices);
@@ -25,8 +23,17 @@ pub(crate) fn marks(problems: &[Problem], mesh: &PolygonMesh, positions: &[Vec3]
             marks.points.extend(places.points.iter().copied().map(Vec3::from_array));
         }
     }
-    for face in faces {
-        marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
-    }
+    marks.segments.extend(sides(faces, positions));
     marks
+}
+
+/// Sides of faces. Vertices that are not in `positions` lie at the origin.
+pub(crate) fn sides<'a>(
+    faces: impl IntoIterator<Item = &'a Vec<u32>>,
+    positions: &[Vec3],
+) -> impl Iterator<Item = [Vec3; 2]> {
+    let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
+    let of_face =
+        move |face: &'a Vec<u32>| (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]]);
+    faces.into_iter().flat_map(of_face).map(move |side| side.map(at))
 }

@@ -53,7 +53,7 @@ impl State {
                 .or_else(|| self.held.stays.clone()),
             held: self.held_marks(),
             joints: self.joint_marks(),
-            draft: Marks { segments: self.draft.clone(), ..Marks::default() },
+            draft: self.draft_marks(),
             floor_height: self.floor_height(),
         }
     }
@@ -149,12 +149,21 @@ impl State {
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
+    /// Creates the lines of a cage that is being made, or of one that is not valid, which is not drawn as a cage.
+    fn draft_marks(&self) -> Marks {
+        let mut segments = self.draft.clone();
+        if segments.is_empty() && self.set().is_none() && self.view.cage {
+            segments.extend(problems::sides(&self.rest().faces, self.pose()));
+        }
+        Marks { segments, ..Marks::default() }
+    }
+
     /// Creates the marks of the cage's faults; none if the view hides faults.
     fn marks(&self) -> Marks {
         if !self.view.problems {
             return Marks::default();
         }
-        problems::marks(&self.faults, self.rest(), self.pose(), self.set().is_none())
+        problems::marks(&self.faults, self.rest(), self.pose())
     }
 
     /// Creates the marks of grabs, pins and of an inner control that is being placed. Before a bind, grabs and pins

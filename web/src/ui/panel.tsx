@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { cageBroken, fixOf, hasUnmadeCage, isCapture, shapeFormatOf } from "../derived";
+import { cageBroken, hasUnmadeCage, isCapture, neededFix, shapeFormatOf } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
@@ -78,10 +78,10 @@ function cageAction(state: AppState, app: App): Action | undefined {
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
   if (!state.cage) return make(T.panel.makeCage);
   if (!cageBroken(state) || hasUnmadeCage(state)) return undefined;
-  const found = state.check?.find((problem) => problem.severity === "error");
-  const fix = found && fixOf(found);
-  if (!fix) return make(T.panel.newCage);
-  return { label: fixLabel(fix, found.count), icon: "patch", run: () => app.cage.applyFix(fix) };
+  const needed = neededFix(state);
+  if (!needed) return make(T.panel.newCage);
+  const { fix, count } = needed;
+  return { label: fixLabel(fix, count), icon: "patch", run: () => app.cage.applyFix(fix) };
 }
 
 const BODIES: Record<StepName, (props: { app: App }) => preact.JSX.Element> = {

@@ -1,8 +1,9 @@
 /** Sentences of the status line. */
 
-import { cageBroken, isCapture } from "../derived";
+import { cageBroken, isCapture, neededFix } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
+import { fixLabel } from "./cage";
 
 /** The status line. It contains no percentages, because the panel and the window's title show them. */
 export function statusOf(state: AppState): string {
@@ -42,6 +43,8 @@ export function hintOf(state: AppState, isTouch: boolean): string {
   if (placing) return T.hints.placing;
   if (painting) return isTouch ? T.models.hintTouch : T.models.hint;
   if (!cage) return T.hints.noCage;
+  const needed = neededFix(state);
+  if (needed) return T.hints.broken(fixLabel(needed.fix, needed.count));
   if (clip.clip !== null) return T.hints[`clip${clip.playing ? "" : "Paused"}${isTouch ? "Touch" : ""}`];
   if (editingRest && !scene.cage) return T.hints.restHidden;
   if (editingRest) return T.hints.rest;

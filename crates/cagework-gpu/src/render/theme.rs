@@ -227,9 +227,9 @@ impl Palette {
         Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
 
-    /// Style of the edges of a previewed cage.
+    /// Style of the edges of a cage that is being made or is not valid.
     pub(super) fn draft(&self) -> Style {
-        Style { colors: [linear(self.selected); 8], widths: [[1.5; 4]; 2], ..self.cage_lines() }
+        Style { colors: [linear(self.cage); 8], widths: [[1.5; 4]; 2], ..self.cage_lines() }
     }
 
     /// Style of joints: dots and rings.

@@ -72,6 +72,7 @@ export const hints = {
   rest: "Drag a handle to edit the cage; the model stays still. Pose, at the top, returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
   unbound: "Bind the model so that it follows its cage.",
+  broken: (fix: string) => `Before the model can be bound, the cage needs “${fix}”.`,
   /** What a drag does. It depends on the tool and on whether the cage is visible. */
   drags: {
     pull: "Pull the model",
