@@ -19,6 +19,7 @@ import {
   largestMove,
   open,
   openWith,
+  placeOf,
   pull,
   reachable,
   rested,
@@ -132,6 +133,19 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     await page.keyboard.press("Control+z");
     await expect(page.getByRole("button", { name: "Undo" })).toBeDisabled();
+  });
+
+  await test.step("a point of the paused frame is pulled, and follows the pointer", async () => {
+    await drawn(page);
+    const before = await cagePositions(page);
+    const at = await grip(page, [0.6, 0.7]);
+    await pull(page, at, 30, -20);
+    await rested(page);
+    await expect(page.getByRole("combobox", { name: "Clip" })).toHaveValue("0");
+    expect(largestMove(before, await cagePositions(page))).toBeGreaterThan(0.01);
+    const to = await placeOf(page, at.point);
+    expect(Math.hypot(to.x - at.x - 30, to.y - at.y + 20), "pixels from the pointer").toBeLessThan(6);
+    await shoot(page, "clip-pulled");
   });
 
   await test.step("the model is pulled without a clip", async () => {

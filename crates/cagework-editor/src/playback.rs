@@ -1,12 +1,13 @@
 //! Playback of clips on all models.
 
+use std::cell::OnceCell;
 use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::field::{Field, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_io::{ModelFormat, Player, RigPose};
-use glam::{Mat4, Vec3};
+use glam::{Mat3, Mat4, Vec3};
 use serde::Serialize;
 
 use crate::bound::{BoundDocument, BoundError};
@@ -132,6 +133,8 @@ pub struct Playback {
     pub field: Option<Field>,
     /// Whether the current time still has to be written to the GPU.
     pub is_new: bool,
+    /// Current vertices in the view, computed when first needed.
+    in_view: OnceCell<Vec<Vec3>>,
 }
 
 impl Playback {
@@ -175,6 +178,7 @@ impl Playback {
             targets: Vec::new(),
             field,
             is_new: true,
+            in_view: OnceCell::new(),
         };
         playing.update();
         Ok(playing)
@@ -228,6 +232,7 @@ impl Playback {
         self.posed = self.played.iter().map(at).collect();
         self.targets = self.posed.iter().flat_map(|posed| &posed.targets).copied().collect();
         self.is_new = true;
+        self.in_view.take();
     }
 
     /// Current matrices of the joints in the view, where the floor moves instead of the lifted models, so that models and
@@ -257,6 +262,36 @@ impl Playback {
     pub fn origin(&self, id: u32, node: u32) -> Option<Vec3> {
         let place = self.played.iter().position(|one| one.id == id)?;
         self.posed[place].origins.get(node as usize).map(|&p| self.in_view().transform_point3(p))
+    }
+
+    /// Whether points of the models can be pulled: the clip is paused, and moves the models after the cage has deformed
+    /// them.
+    #[must_use]
+    pub fn can_pull(&self) -> bool {
+        self.is_paused && self.field.is_none()
+    }
+
+    /// Current vertices in the view, like [`Self::palette`], without the cage's field. `[n_vertices]`
+    #[must_use]
+    pub fn positions_in_view(&self) -> &[Vec3] {
+        self.in_view.get_or_init(|| skin_vertices(&self.skin, &self.palette(), &self.targets))
+    }
+
+    /// Converts a displacement in the view, at a point of a triangle with these vertices, to the displacement of the models
+    /// before the clip moves them: by the inverse of the blended joint matrices. `None` if these are not invertible.
+    #[must_use]
+    pub fn before_clip(&self, corners: [u32; 3], bary: [f32; 3], displacement: Vec3) -> Option<Vec3> {
+        let palette = self.palette();
+        let mut blended = Mat3::ZERO;
+        for (vertex, share) in corners.into_iter().zip(bary) {
+            let [start, end] = [0, 1].map(|next| self.skin.joint_starts[vertex as usize + next] as usize);
+            for &(joint, weight) in &self.skin.joints[start..end] {
+                blended += share * weight * Mat3::from_mat4(palette[joint as usize]);
+            }
+        }
+        let to_view = blended * Mat3::from_mat4(self.up).transpose();
+        let before = to_view.inverse() * displacement;
+        before.is_finite().then_some(before)
     }
 
     /// Computes the current vertices of the exported models, in the axes of the scene. `[n_vertices]`

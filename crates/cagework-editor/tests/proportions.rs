@@ -12,7 +12,7 @@ use cagework_editor::{
     BoundDocument, BoundModels, Command, Contents, DocumentSettings, Editor, FoldSample, KnownGround,
     Playback, PoseSettings, RigOptions,
 };
-use cagework_io::{Model, RigPose, read_project, write_mesh_glb};
+use cagework_io::{Joints, Model, RigPose, read_project, write_mesh_glb};
 use cagework_pose::proportions::Proportion;
 use glam::Vec3;
 
@@ -407,4 +407,44 @@ fn the_lift_of_the_view_is_that_of_exports_and_clips() {
     assert!((low(&playback.positions()) - rest).abs() < 10.0 * ROUNDING);
     let in_view = skin_vertices(&playback.skin, &playback.palette(), playback.targets());
     assert!((low(&in_view) - posed).abs() < 10.0 * ROUNDING, "where the cage is");
+}
+
+/// The cage moves as a whole, and the joints stay: the clip then moves a point by its blended matrix alone.
+#[test]
+fn a_displacement_before_a_clip_is_shown_as_wanted() {
+    let mut editor = opened(&GLB);
+    let bound = bound(&editor);
+    let ground = KnownGround::default();
+    let mut options = RigOptions::default();
+    options.reshape.joints = Joints::Stay;
+    let shown = |editor: &Editor| {
+        let all = BoundDocument { editor, bound: Some(&bound), parts: None, lattice: None, ground: &ground };
+        let mut playback = Playback::new(all, options.clone()).unwrap();
+        playback.show(Some(0), 0.3, Vec::new());
+        playback
+    };
+    let before = shown(&editor);
+    assert!(before.can_pull());
+    let wanted = Vec3::new(0.1, -0.05, 0.2);
+    let models = &editor.document().models;
+    // Points on triangles whose joints the clip turns differently.
+    let points: Vec<([u32; 3], [f32; 3])> = models
+        .triangles()
+        .iter()
+        .step_by(models.triangles().len() / 4)
+        .map(|&corners| (corners, [0.2, 0.3, 0.5]))
+        .collect();
+    let place = |playback: &Playback, (corners, bary): ([u32; 3], [f32; 3])| -> Vec3 {
+        corners.iter().zip(bary).map(|(&v, share)| share * playback.positions_in_view()[v as usize]).sum()
+    };
+    let mut largest = 0.0_f32;
+    let pose = editor.document().pose.to_vec();
+    for point in points {
+        let by = before.before_clip(point.0, point.1, wanted).unwrap();
+        largest = largest.max(by.distance(wanted));
+        editor.set_pose(pose.iter().map(|p| *p + by).collect()).unwrap();
+        let moved = place(&shown(&editor), point) - place(&before, point);
+        assert!(moved.distance(wanted) < 10.0 * ROUNDING, "{moved}");
+    }
+    assert!(largest > 0.05, "the clip turns no point: {largest}");
 }

@@ -171,8 +171,13 @@ impl State {
     fn held_marks(&self) -> Marks {
         let GrabState { points, target, placed, .. } = &self.held;
         let held = [points, &*self.editor.document().pins].concat();
-        let mut points = self.bound_document().followed(&held);
-        let line = target.zip(points.first()).map(|(to, from)| [*from, to]);
+        let clip = self.pulled_clip();
+        let mut points = match clip {
+            Some(_) => held.iter().filter_map(|&point| self.shown_models().place_of(point)).collect(),
+            None => self.bound_document().followed(&held),
+        };
+        // The target is a position without the motion of the clip.
+        let line = target.filter(|_| clip.is_none()).zip(points.first()).map(|(to, from)| [*from, to]);
         let placing = placed.windows(2).map(|pair| [pair[0], pair[1]]);
         let segments = line.into_iter().chain(placing).collect();
         points.extend(placed);

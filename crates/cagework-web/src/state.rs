@@ -8,6 +8,7 @@ use std::sync::Arc;
 use cagework_cage::check::Problem;
 use cagework_core::field::FieldWeights;
 use cagework_core::slice::Slice;
+use cagework_core::view::View as _;
 use cagework_core::{Bounds, ControlSet, Coordinates, PolygonMesh};
 use cagework_editor::{
     BoundDocument, BoundModels, Cache, CageWatch, Editor, Key, KnownGround, Models, Playback, PosedModels,
@@ -358,6 +359,32 @@ impl State {
             is_playing: self.playing.is_some(),
             view: &self.camera,
         }
+    }
+
+    /// The models as the view shows them, for picking: those of a clip that can be pulled, otherwise [`Self::posed_models`].
+    pub(crate) fn shown_models(&self) -> PosedModels<'_> {
+        match self.pulled_clip() {
+            Some(clip) => {
+                PosedModels { positions: clip.positions_in_view(), is_playing: false, ..self.posed_models() }
+            }
+            None => self.posed_models(),
+        }
+    }
+
+    /// The paused clip whose models can be pulled.
+    pub(crate) fn pulled_clip(&self) -> Option<&Playback> {
+        self.playing.as_ref().filter(|playing| playing.can_pull())
+    }
+
+    /// Moves a position of the posed models, `place`, so that the view shows it moved by CSS pixels parallel to the view
+    /// plane. `point`: the surface point there, whose motion by a clip is taken into account.
+    pub(crate) fn moved_in_view(&self, place: Vec3, by: Vec2, point: Option<SurfacePoint>) -> Vec3 {
+        let in_clip = point.zip(self.pulled_clip()).and_then(|(point, clip)| {
+            let shown = self.shown_models().place_of(point)?;
+            let corners = self.models().corners(point.triangle)?;
+            clip.before_clip(corners, point.bary, self.camera.in_view_plane(shown, by))
+        });
+        place + in_clip.unwrap_or_else(|| self.camera.in_view_plane(place, by))
     }
 
     /// Joins the draw data of all models.

@@ -98,7 +98,9 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
   };
 
   const aim = (drag: Drag) => {
-    drag.to = engine().followed(drag.place, drag.by.right, drag.by.up);
+    const [first] = drag.grabs;
+    const point = typeof first === "object" ? first : undefined;
+    drag.to = engine().followed(drag.place, drag.by.right, drag.by.up, point);
     drag.wanted += 1;
   };
 

@@ -1,6 +1,6 @@
 /** Sentences of the status line. */
 
-import { cageBroken, isCapture, neededFix } from "../derived";
+import { cageBroken, isCapture, neededFix, rigOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { fixLabel } from "./cage";
@@ -45,7 +45,10 @@ export function hintOf(state: AppState, isTouch: boolean): string {
   if (!cage) return T.hints.noCage;
   const needed = neededFix(state);
   if (needed) return T.hints.broken(fixLabel(needed.fix, needed.count));
-  if (clip.clip !== null) return T.hints[`clip${clip.playing ? "" : "Paused"}${isTouch ? "Touch" : ""}`];
+  if (clip.clip !== null && clip.playing) return isTouch ? T.hints.clipTouch : T.hints.clip;
+  // A clip that the cage deforms after it has moved the model cannot be pulled.
+  if (clip.clip !== null)
+    return T.hints[isTouch ? "clipPausedTouch" : "clipPaused"](scene.pull && !rigOf(state).dynamic);
   if (editingRest && !scene.cage) return T.hints.restHidden;
   if (editingRest) return T.hints.rest;
   if (!bound) return bindRun ? T.hints.binding : T.hints.unbound;

@@ -21,11 +21,11 @@ impl Engine {
     /// during playback.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
-        let found = self.posed(|state| state.posed_models().surface_at(state.pointer(x, y))).ok().flatten();
+        let found = self.posed(|state| state.shown_models().surface_at(state.pointer(x, y))).ok().flatten();
         optional(found)
     }
 
-    /// Returns the posed position of a surface point; empty if the point does not exist. `[3]`
+    /// Returns the position in which the view shows a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
     /// If `point` is not a surface point. Without weights.
@@ -35,7 +35,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
     ) -> Answer<Vec<f32>> {
         let point = decode(point)?;
-        let place = self.posed(|state| state.posed_models().place_of(point))?;
+        let place = self.posed(|state| state.shown_models().place_of(point))?;
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
@@ -54,7 +54,7 @@ impl Engine {
     ) -> Answer<JsValue> {
         let grabs: Vec<Grab> = decode(grabs)?;
         let (rows, seeds): (Vec<Vec<f64>>, Vec<u32>) = self.posed(|state| {
-            let pins = state.posed_models().pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
+            let pins = state.shown_models().pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
             grabs.into_iter().chain(pins).filter_map(|grab| state.bound_document().grip_of(grab)).unzip()
         })?;
         let rows = Float64Array::from(rows.concat().as_slice());
@@ -67,7 +67,7 @@ impl Engine {
     /// pin is added at the surface point under the pointer. Undefined if nothing changes, or without weights.
     #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
     pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
-        let pins = self.posed(|state| state.posed_models().pins_after(state.pointer(x, y), may_pin));
+        let pins = self.posed(|state| state.shown_models().pins_after(state.pointer(x, y), may_pin));
         optional(pins.ok().flatten())
     }
 
@@ -86,13 +86,23 @@ impl Engine {
         Ok(optional(image))
     }
 
-    /// Moves a position parallel to the view plane by `dx`, `dy` CSS pixels. `[3]`
+    /// Moves a position of the posed models, without the motion of a clip, so that the view shows it moved by `dx`, `dy`
+    /// CSS pixels parallel to the view plane. `point`: the surface point at the position. `[3]`
+    ///
+    /// # Errors
+    /// If `point` is neither undefined nor a surface point.
     #[wasm_bindgen(js_name = followed)]
-    pub fn followed(&self, place: &[f32], dx: f32, dy: f32) -> Vec<f32> {
+    pub fn followed(
+        &self,
+        place: &[f32],
+        dx: f32,
+        dy: f32,
+        #[wasm_bindgen(unchecked_param_type = "SurfacePoint | undefined")] point: JsValue,
+    ) -> Answer<Vec<f32>> {
+        let point = decode(point)?;
         let [x, y, z] = place.first_chunk().copied().unwrap_or_default();
-        let place = Vec3::new(x, y, z);
-        let moved = self.read(|state| place + state.camera.in_view_plane(place, Vec2::new(dx, dy)));
-        moved.to_array().to_vec()
+        let moved = self.read(|state| state.moved_in_view(Vec3::new(x, y, z), Vec2::new(dx, dy), point));
+        Ok(moved.to_array().to_vec())
     }
 
     /// Marks grabs and pins; the first point is the grab. `target`: position of the pointer, if the grab is not there.

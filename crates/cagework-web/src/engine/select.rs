@@ -36,7 +36,7 @@ impl Engine {
             if state.has_cage_in_view() { picked() } else { Vec::new() }
         });
         let covers =
-            |vertex| self.posed(|state| state.posed_models().covers(vertex, state.pointer(x, y), radius));
+            |vertex| self.posed(|state| state.shown_models().covers(vertex, state.pointer(x, y), radius));
         if matches!(picked[..], [vertex] if covers(vertex).unwrap_or(false)) { Vec::new() } else { picked }
     }
 

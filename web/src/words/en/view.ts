@@ -62,9 +62,10 @@ export const status = {
 export const hints = {
   clip: "A clip is playing: drag to turn, scroll to zoom. Pause to pose it with the cage.",
   clipTouch: "A clip is playing: one finger turns, two move and zoom. Pause to pose it with the cage.",
-  clipPaused: "Drag a handle of the cage to pose the whole clip · drag elsewhere to turn · scroll to zoom",
-  clipPausedTouch:
-    "Drag a handle of the cage to pose the whole clip. Elsewhere, one finger turns, two move and zoom.",
+  clipPaused: (pulls: boolean) =>
+    `${pulls ? "Pull the model or a handle" : "Drag a handle of the cage"} to pose the whole clip · drag elsewhere to turn · scroll to zoom`,
+  clipPausedTouch: (pulls: boolean) =>
+    `${pulls ? "Pull the model or a handle" : "Drag a handle of the cage"} to pose the whole clip. Elsewhere, one finger turns, two move and zoom.`,
   noCage: "A model needs a cage around it before it can be posed.",
   placing:
     "The control is placed under the pointer, halfway between the model's front and back. Drag to turn the view.",
