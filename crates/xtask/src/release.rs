@@ -10,14 +10,17 @@ use crate::wasm::target_folder;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 const HOMEPAGE: &str = env!("CARGO_PKG_HOMEPAGE");
+const MIN_RUST: &str = env!("CARGO_PKG_RUST_VERSION");
 
-/// Texts that files outside the Cargo workspace contain: the version and the addresses of `Cargo.toml`.
-fn expected() -> [(&'static str, Vec<String>); 9] {
+/// Texts that files outside the Cargo workspace contain: the version and the addresses of `Cargo.toml`, and its minimum
+/// Rust version, with which everything is built and tested.
+fn expected() -> [(&'static str, Vec<String>); 10] {
     let quoted = |key: &str| format!("{key} = \"{VERSION}\"");
     let json = format!("\"version\": \"{VERSION}\"");
     let link = vec![format!("{REPOSITORY}/blob/main/docs/")];
     let urls = [REPOSITORY, HOMEPAGE].map(|url| format!("\"{url}\""));
     [
+        ("rust-toolchain.toml", vec![format!("channel = \"{MIN_RUST}.0\"")]),
         ("package.json", vec![json.clone()]),
         ("web/package/package.json", vec![json, format!("\"git+{REPOSITORY}.git\""), urls[1].clone()]),
         ("web/package/README.md", link.clone()),
