@@ -1,7 +1,6 @@
 //! The class `Cage`, `generate_cage` and `check_cage`.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
-use std::path::PathBuf;
 
 use cagework_cage::check::check_smooth;
 use cagework_cage::generate::{CageReport, Rings};
@@ -119,10 +118,10 @@ impl Cage {
         Self::of(py, (&model.cage_mesh(), model.origin()), smooth, None)
     }
 
-    /// Writes the cage as an OBJ file: at rest, or with the posed vertices [n_cage, 3], float32 or float64, object
-    /// units.
+    /// Writes the cage as an OBJ file, to a path or a file object: at rest, or with the posed vertices [n_cage, 3],
+    /// float32 or float64, object units.
     ///
-    /// Raises OSError, ArrayError.
+    /// Raises OSError, TypeError, ArrayError.
     ///
     /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
     /// >>> cage.save("wide.obj", cage.vertices * [2, 1, 1])
@@ -134,7 +133,7 @@ impl Cage {
             let posed = arrays::finite_points("vertices", vertices, Some(n), self.origin)?;
             mesh.positions = posed.as_slice().to_vec();
         }
-        files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh, self.origin))
+        files::write(path, &write_cage_obj(&mesh, self.origin))
     }
 
     /// Rest positions, [n_cage, 3] float64, object units. Read-only: use cage.vertices.copy() for a pose.

@@ -1,6 +1,5 @@
 //! The class `Field`: the deformation of the space in and around a cage.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use cagework_core::BindOptions;
@@ -137,18 +136,17 @@ impl Field {
         PyArray1::from_vec(py, flat).reshape([n, 3, 3])
     }
 
-    /// Writes the lattice as an .npz file, as `cagework deform --lattice` does.
+    /// Writes the lattice as an .npz file, as `cagework deform --lattice` does, to a path or a file object.
     ///
-    /// Raises OSError.
+    /// Raises OSError, TypeError.
     ///
     /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
     /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
     /// >>> field.save("field.npz")
     /// >>> sorted(np.load("field.npz"))  # doctest: +ELLIPSIS
     /// [...]
-    #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        files::write(&path, &write_field_npz(&self.field, self.cage.get().origin(), UpAxis::Y))
+    fn save(&self, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        files::write(path, &write_field_npz(&self.field, self.cage.get().origin(), UpAxis::Y))
     }
 
     fn __repr__(&self) -> String {

@@ -151,12 +151,26 @@ fn named(path: &Path, error: &io::Error) -> PyErr {
     io::Error::new(error.kind(), format!("{}: {error}", shown(&path.to_string_lossy()))).into()
 }
 
-/// Writes a file.
+/// Writes to a path or to a file object.
 ///
 /// # Errors
-/// `OSError`.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
-    std::fs::write(path, bytes).map_err(|e| named(path, &e))
+/// `OSError`; `TypeError` for anything else; the errors of a file object.
+pub(crate) fn write(to: &Bound<'_, PyAny>, bytes: &[u8]) -> PyResult<()> {
+    if let Ok(path) = to.extract::<PathBuf>() {
+        return std::fs::write(&path, bytes).map_err(|e| named(&path, &e));
+    }
+    if !to.hasattr("write")? {
+        let kind = to.get_type().name()?;
+        let message = format!("path: expected a path or a file opened with mode 'wb', got {kind}");
+        return Err(PyTypeError::new_err(message));
+    }
+    to.call_method1("write", (PyBytes::new(to.py(), bytes),)).map(drop)
+}
+
+/// Name of the file at a path or of a file object; empty if it has none.
+pub(crate) fn name_of(to: &Bound<'_, PyAny>) -> String {
+    let path = to.extract::<PathBuf>().or_else(|_| to.getattr("name")?.extract());
+    path.map_or_else(|_: PyErr| String::new(), |path| path.to_string_lossy().into_owned())
 }
 
 /// Interprets an argument that is a model or a list of models.

@@ -1,6 +1,5 @@
 //! The class `Splats`: a capture of Gaussian splats.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use cagework_core::splats::{Splats as CoreSplats, n_harmonics};
@@ -169,21 +168,23 @@ impl Splats {
         Ok((arrays::array_of(py, vertices, self.model.origin())?, arrays::triples(py, &triangles)?))
     }
 
-    /// Writes the splats; the extension selects the format. If it is the format from which the splats were read,
+    /// Writes the splats to a path or a file object. The format is `format` ("ply", "splat", "spz" or "glb"), or that of the
+    /// name's extension. If it is the format from which the splats were read,
     /// unchanged splats are copied from that file, except in a .glb and in an .spz of another version than 3, whose
     /// splats are encoded again.
     ///
-    /// Raises OSError, ModelError.
+    /// Raises OSError, TypeError, ModelError.
     ///
     /// >>> splats = cw.Splats("plant.splat")
     /// >>> splats.save("plant.ply")
-    #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let format = ModelFormat::of_export(&path.to_string_lossy());
-        let format = format.ok_or_else(|| error::model("the name must end in .ply, .splat, .spz or .glb"))?;
+    #[pyo3(signature = (path, format = None))]
+    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>, format: Option<&str>) -> PyResult<()> {
+        let name = format.map_or_else(|| files::name_of(path), |format| format!(".{format}"));
+        let wanted = "give a name that ends in .ply, .splat, .spz or .glb, or the format";
+        let format = ModelFormat::of_export(&name).ok_or_else(|| error::model(wanted))?;
         let bytes =
             work::run(py, |_| self.model.write_splats(format, &self.splats))?.map_err(error::model)?;
-        files::write(&path, &bytes)
+        files::write(path, &bytes)
     }
 }
 

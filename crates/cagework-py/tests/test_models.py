@@ -8,7 +8,7 @@ import cagework as cw
 import numpy as np
 import pytest
 import trimesh
-from support import bent, box, rigged_glb
+from support import bent, box, rigged_glb, splat_records
 
 
 def forms_of(mesh):
@@ -58,6 +58,24 @@ def test_file_objects_are_read(cage, tmp_path):
         assert cw.Cage.load(file) == cw.Cage.load(tmp_path / "cage.obj")
     with open(tmp_path / "cage.obj") as file, pytest.raises(TypeError, match="model: the file is read as str, .* open it with mode 'rb'"):
         cw.read_model(file)
+
+
+def test_file_objects_are_written(cage, tmp_path):
+    (tmp_path / "a.splat").write_bytes(splat_records().tobytes())
+    splats = cw.Splats(tmp_path / "a.splat")
+    field = cw.Field(cage, bent(cage), cells=12)
+    for name, save in [("a.obj", cage.save), ("a.npz", field.save), ("a.ply", splats.save)]:
+        save(tmp_path / name)
+        with open(tmp_path / f"b-{name}", "wb") as file:
+            save(file)
+        assert (tmp_path / f"b-{name}").read_bytes() == (tmp_path / name).read_bytes()
+    memory = io.BytesIO()
+    splats.save(memory, format="ply")
+    assert memory.getvalue() == (tmp_path / "a.ply").read_bytes()
+    with pytest.raises(cw.ModelError, match="or the format"):
+        splats.save(memory)
+    with pytest.raises(TypeError, match="path: expected a path or a file opened with mode 'wb', got int"):
+        cage.save(3)
 
 
 def test_a_file_gives_the_cage_of_the_command(tmp_path):
