@@ -1,5 +1,6 @@
 //! Runs work without the interpreter lock, cancellable by Ctrl-C and by a progress function.
 
+use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -19,20 +20,21 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// # Errors
 /// The exception of a signal handler, usually `KeyboardInterrupt`.
 pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T + Send) -> PyResult<T> {
-    run_with(py, None, work)
+    let Ok(outcome) = run_with(py, None, |progress| Ok::<T, Infallible>(work(progress)))?;
+    Ok(outcome)
 }
 
 /// Runs `work` in another thread and releases the interpreter lock. The calling thread polls for signals, which Python
-/// delivers to its main thread only, and calls `progress` with the completed fraction, also at the end. If a signal handler or
-/// `progress` raises, the work is cancelled.
+/// delivers to its main thread only, and calls `progress` with the completed fraction, and with 1 if the work succeeds. If a
+/// signal handler or `progress` raises, the work is cancelled.
 ///
 /// # Errors
 /// The exception of a signal handler, usually `KeyboardInterrupt`, or of `progress`.
-pub(crate) fn run_with<T: Send>(
+pub(crate) fn run_with<T: Send, E: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&dyn Progress) -> T + Send,
-) -> PyResult<T> {
+    work: impl FnOnce(&dyn Progress) -> Result<T, E> + Send,
+) -> PyResult<Result<T, E>> {
     let (cancelled, fraction) = (AtomicBool::new(false), AtomicU32::new(0));
     let report = |event: ProgressEvent| {
         fraction.store(event.fraction.to_bits(), Ordering::Relaxed);
@@ -64,6 +66,9 @@ pub(crate) fn run_with<T: Send>(
                 }
             }
             let outcome = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
+            if outcome.is_ok() {
+                fraction.store(1.0_f32.to_bits(), Ordering::Relaxed);
+            }
             if raised.is_none() && progress.is_some() {
                 raised = Python::attach(poll).err();
             }

@@ -102,6 +102,13 @@ class Bar:
     refresh = update
 
 
+def test_progress_ends_at_one():
+    model = cw.Cage(*box(4))
+    fractions = []
+    cw.generate_cage(model.vertices, model.triangles, target=30, progress=fractions.append)
+    assert fractions[-1] == 1 and fractions == sorted(fractions)
+
+
 def test_progress_moves_a_bar():
     bar = Bar()
     cw.bind(np.zeros((1, 3)), cw.Cage(*box(4)), grid=64, progress=bar)
