@@ -14,7 +14,7 @@ mod solve;
 mod transfer;
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, KindArg};
@@ -26,6 +26,7 @@ use clap::builder::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::files::{STREAM, is_stream, stream_name};
 pub(crate) use clip::ClipArgs;
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use field::MapArgs;
@@ -46,7 +47,8 @@ pub(crate) use transfer::TransferArgs;
     cagework demo\n  \
     cagework info horse.glb\n  \
     cagework bind horse.glb --cage cage.obj --weights horse.npz --report horse.json\n  \
-    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb"
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
+    cagework cage - --format stl -o cage.obj < horse.stl"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -54,6 +56,12 @@ pub(crate) struct Cli {
     /// Print the result as JSON on stdout, an error as JSON on stderr, and no text.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+    /// Show no progress and print no notes.
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+    /// Format of a model that is read from standard input or written to standard output; both are named -.
+    #[arg(long, global = true, value_name = "FORMAT", value_parser = stream_format)]
+    pub(crate) format: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -304,12 +312,16 @@ impl FromStr for ModelOutput {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(format) = ModelFormat::of_export(text) {
+        let name = if is_stream(Path::new(text)) { stream_name() } else { text.to_owned() };
+        if let Some(format) = ModelFormat::of_export(&name) {
             return Ok(Self { path: text.into(), format });
+        }
+        if name == STREAM {
+            return Err("standard output needs a format, such as --format obj".to_owned());
         }
         let written = ModelFormat::ALL.into_iter().filter(|format| format.is_written());
         let endings: Vec<&str> = written.map(ModelFormat::export_extension).collect();
-        let is_read = ModelFormat::of_name(text).is_some_and(|format| !format.is_written());
+        let is_read = ModelFormat::of_name(&name).is_some_and(|format| !format.is_written());
         let reason = if is_read { "this format is read, but not written: " } else { "" };
         Err(format!("{reason}{}", wrong_ending(&endings)))
     }
@@ -387,11 +399,19 @@ fn obj_output(text: &str) -> Result<PathBuf, String> {
 
 fn output(text: &str, extensions: &[&str]) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
+    if is_stream(&path) {
+        return Ok(path);
+    }
     let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if extensions.contains(&given.as_str()) {
         return Ok(path);
     }
     Err(wrong_ending(extensions))
+}
+
+fn stream_format(text: &str) -> Result<String, String> {
+    let known = ModelFormat::of_name(&format!("model.{text}")).is_some();
+    if known { Ok(text.to_owned()) } else { Err("not the extension of a model's format".to_owned()) }
 }
 
 fn wrong_ending(extensions: &[&str]) -> String {

@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use crate::args::{CageSource, ControlArgs, MemoryArgs, ModelOutput};
 use crate::controls::load_controls;
 use crate::error::CliError;
-use crate::files::{read, read_beside, shown_path};
+use crate::files::{model_name, read, read_beside, shown_path};
 use crate::progress::Bar;
 
 /// A cage, and the model that it was read from. Pose files must match this model.
@@ -74,9 +74,8 @@ pub(crate) fn cage_mesh(model: &Model) -> Result<PolygonMesh, CageError> {
 /// If the file cannot be read, or needs more than the memory limit.
 pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
-    let name = path.display().to_string();
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_within(&name, bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_within(&model_name(path), bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
     Ok(model)
 }
@@ -88,7 +87,7 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
 pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_with_clips(&path.display().to_string(), bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_with_clips(&model_name(path), bytes, &mut beside, memory.bytes())?;
     refuse_splats(&model, path)?;
     if !model.positions.is_empty() {
         model.require_faces()?;

@@ -42,6 +42,9 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     signals::listen(files::abandon);
+    if cli.quiet {
+        files::be_quiet();
+    }
     let outcome = match &cli.command {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),

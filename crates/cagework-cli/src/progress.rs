@@ -6,12 +6,13 @@ use std::ops::ControlFlow;
 use cagework_core::progress::{Progress, ProgressEvent, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::files::is_quiet;
 use crate::signals::{self, CancelGuard};
 
 /// Number of positions of the bar, more than a terminal has columns.
 const STEPS: u64 = 1000;
 
-/// A progress bar on stderr, hidden unless stderr is a terminal. Reports a signal such as Ctrl-C or SIGTERM as
+/// A progress bar on stderr, hidden with `--quiet` and unless stderr is a terminal. Reports a signal such as Ctrl-C or SIGTERM as
 /// cancellation of the work.
 pub(crate) struct Bar {
     bar: ProgressBar,
@@ -21,8 +22,8 @@ pub(crate) struct Bar {
 impl Bar {
     /// Shows the bar, and makes the first signal cancel the work.
     pub(crate) fn start() -> Self {
-        let bar =
-            if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
+        let is_shown = std::io::stderr().is_terminal() && !is_quiet();
+        let bar = if is_shown { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
         let style = ProgressStyle::with_template("{prefix:10} [{bar:30}] {percent:>3}%  ETA {eta:<4} {msg}")
             .expect("the template is a constant")
             .progress_chars("=> ");

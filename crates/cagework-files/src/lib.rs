@@ -18,6 +18,19 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     content(File::open_ambient_with(path, &to_read(), ambient_authority())?)
 }
 
+/// Reads a stream, such as standard input, to its end.
+///
+/// # Errors
+/// If it is empty, longer than [`MAX_MODEL_BYTES`], or cannot be read. The message of a refused stream is a predicate.
+pub fn read_stream(stream: impl std::io::Read) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.is_empty() {
+        return Err(Error::other("is empty"));
+    }
+    check_size(bytes.len() as u64).map(|()| bytes)
+}
+
 /// Reads a file that the model `main` names by a relative path, such as a glTF buffer. `None` if the file does not exist.
 ///
 /// # Errors
@@ -64,11 +77,6 @@ fn content(file: File) -> Result<Vec<u8>> {
     if !metadata.is_file() {
         return Err(Error::other("is a pipe or a device, not a regular file"));
     }
-    let check_size = |bytes: u64| {
-        let limit = MAX_MODEL_BYTES >> 20;
-        let problem = || Error::other(format!("is {} MiB large; at most {limit} MiB are read", bytes >> 20));
-        if bytes > MAX_MODEL_BYTES { Err(problem()) } else { Ok(()) }
-    };
     check_size(metadata.len())?;
     // Files in /proc and similar file systems report a length of 0 as well. They are rejected too, although they are
     // not empty.
@@ -82,6 +90,12 @@ fn content(file: File) -> Result<Vec<u8>> {
     // The file may have grown since its length was read.
     file.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes)?;
     check_size(bytes.len() as u64).map(|()| bytes)
+}
+
+fn check_size(bytes: u64) -> Result<()> {
+    let limit = MAX_MODEL_BYTES >> 20;
+    let problem = || Error::other(format!("is {} MiB large; at most {limit} MiB are read", bytes >> 20));
+    if bytes > MAX_MODEL_BYTES { Err(problem()) } else { Ok(()) }
 }
 
 #[cfg(all(test, target_os = "linux"))]

@@ -18,7 +18,7 @@ use crate::args::{CageSource, ControlArgs, DeformArgs, ModelOutput, SmoothArgs};
 use crate::bind::bind_job;
 use crate::controls::rest_of;
 use crate::error::CliError;
-use crate::files::{check_outputs, is_newer, json, print, read, refuse_files_read, write};
+use crate::files::{check_outputs, is_newer, is_stream, json, print, read, refuse_files_read, write};
 use crate::load::{load_any, load_cage, load_weights, load_with_clips, states_of};
 use crate::progress::Bar;
 
@@ -134,6 +134,13 @@ pub(super) fn run(
     summary.set_most_bent(&times, &all);
     if job.uses_field() || !output.format.holds_poses() {
         inputs.retain(|path| path.exists());
+        if is_stream(&output.path) {
+            return Err(CliError::Mismatch {
+                message: "a sequence of frames is several files: it cannot be written to standard output"
+                    .to_owned(),
+                hint: "give a file name, such as walk.ply",
+            });
+        }
         let paths: Vec<PathBuf> = (1..=times.len()).map(|k| numbered(&output.path, k, times.len())).collect();
         refuse_files_read(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
         for (path, (pose, _)) in paths.iter().zip(all) {

@@ -11,7 +11,7 @@ use cagework_core::progress::Cancellation;
 use cagework_io::Model;
 
 use super::whole::replace;
-use super::{INPUT_FILES, folder_of, read, read_beside, reason};
+use super::{INPUT_FILES, folder_of, is_stream, read, read_beside, reason, write_to_stdout};
 use crate::error::{CliError, shown_path};
 use crate::signals;
 
@@ -45,7 +45,8 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
             return Err(CliError::file(output, "cannot be written, a folder has this name"));
         }
         refuse_inputs(identity, &inputs)?;
-        if identities[..i].iter().any(|other| other.is_same(identity)) {
+        let is_second_stream = is_stream(output) && outputs[..i].contains(output);
+        if is_second_stream || identities[..i].iter().any(|other| other.is_same(identity)) {
             return Err(CliError::Mismatch {
                 message: format!("{}: is given for two outputs", shown_path(output)),
                 hint: "choose different names",
@@ -104,7 +105,7 @@ pub(crate) fn refuse_files_named(
     Ok(())
 }
 
-/// Creates or replaces a file atomically; on failure, an existing file is unchanged. A symbolic link is preserved, and
+/// Writes an output to a file or to stdout. Creates or replaces a file atomically; on failure, an existing file is unchanged. A symbolic link is preserved, and
 /// its target is written. Devices, pipes and open descriptors are appended to.
 ///
 /// # Errors
@@ -113,6 +114,9 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     // A signal may have arrived since the work last polled for cancellation.
     if signals::cancelled() {
         return Err(BindError::Cancelled(Cancellation).into());
+    }
+    if is_stream(path) {
+        return write_to_stdout(bytes);
     }
     refuse_files_read(&[path])?;
     let written = place(path).and_then(|place| match place {
@@ -144,6 +148,9 @@ pub(super) struct FileIdentity {
 
 impl FileIdentity {
     pub(super) fn new(path: &Path) -> Self {
+        if is_stream(path) {
+            return Self { path: path.into(), state: None, place: None };
+        }
         let state =
             fs::metadata(path).ok().filter(fs::Metadata::is_file).map(|m| (m.len(), m.modified().ok()));
         Self { path: path.into(), state, place: place(path).ok().flatten() }

@@ -22,7 +22,7 @@ use crate::bind::bind_positions;
 use crate::controls::with_inner;
 use crate::error::CliError;
 use crate::files::{
-    check_outputs, is_newer, json, make_folder, models_of_folders, print, read, read_beside,
+    check_outputs, is_newer, is_stream, json, make_folder, models_of_folders, print, read, read_beside,
     refuse_files_named, shown_path, write,
 };
 use crate::load::{load_cage_file, load_model, load_with_clips};
@@ -175,6 +175,12 @@ fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Refit>, CliError> {
         if models.is_empty() {
             return Err(CliError::file(path, "names no model"));
         }
+    }
+    if models.iter().chain([&args.output]).any(|path| is_stream(path)) {
+        return Err(CliError::Mismatch {
+            message: "refit reads and writes files, not standard input and output".to_owned(),
+            hint: "`cagework deform` takes one model from standard input",
+        });
     }
     let models = models_of_folders(&models, shared)?;
     let mut by_output: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();

@@ -24,6 +24,7 @@ mod render;
 mod rigs;
 mod siblings;
 mod splats;
+mod streams;
 mod support;
 mod transfer;
 mod usage;
