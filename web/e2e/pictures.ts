@@ -255,3 +255,40 @@ test("pictures of the documents", async ({ page }) => {
     .locator("#stage")
     .screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80, scale: "css" });
 });
+
+/** Parts of the page that the picture at the start of docs/page.md numbers, in the order of the list below it. */
+const PARTS: readonly { readonly selector: string; readonly at: readonly [x: number, y: number] }[] = [
+  { selector: ".steps", at: [-0.05, 0.5] },
+  { selector: "canvas", at: [0.36, 0.2] },
+  { selector: ".tools", at: [1.35, 0.05] },
+  { selector: ".looks", at: [-0.15, 0.5] },
+  { selector: ".axes", at: [-0.15, 0.5] },
+  { selector: "#panel", at: [0.85, 0.04] },
+  { selector: ".panel-foot", at: [0.9, 0] },
+  { selector: ".bottom-line", at: [0.03, -0.6] },
+  { selector: ".timeline", at: [0.5, 0] },
+  { selector: ".bar-actions", at: [0.36, 0.5] },
+];
+
+test("the picture of the page with numbers", async ({ page }) => {
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await open(page);
+  await page.getByRole("button", { name: /Legs close together/ }).click();
+  await bound(page);
+  await page.getByRole("button", { name: "Pose it" }).click();
+  await drawn(page);
+  await page.evaluate((parts) => {
+    document.querySelector("#toasts")?.remove();
+    for (const [k, { selector, at }] of parts.entries()) {
+      const box = document.querySelector(selector)?.getBoundingClientRect();
+      if (!box) throw new Error(`no ${selector}`);
+      const label = document.createElement("div");
+      label.textContent = String(k + 1);
+      label.style.cssText = `position: fixed; z-index: 99; width: 30px; height: 30px; border-radius: 50%;
+        background: #b3261e; color: white; font: bold 18px/30px sans-serif; text-align: center;
+        left: ${box.left + at[0] * box.width - 15}px; top: ${box.top + at[1] * box.height - 15}px;`;
+      document.body.append(label);
+    }
+  }, PARTS);
+  await page.screenshot({ path: join(DOCUMENTS, "page-parts.jpg"), quality: 70, scale: "css" });
+});
