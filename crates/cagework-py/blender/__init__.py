@@ -2,9 +2,9 @@
 
 import bpy
 
-from . import binding, operators, panel
+from . import bake, binding, operators, panel
 
-CLASSES = [binding.Binding, *operators.CLASSES, panel.Panel]
+CLASSES = [binding.Binding, *operators.CLASSES, *bake.CLASSES, panel.Panel]
 HANDLERS = ["depsgraph_update_post", "frame_change_post"]
 RESET_EVENTS = ["undo_post", "redo_post", "load_post"]
 

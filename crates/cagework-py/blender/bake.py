@@ -1,0 +1,146 @@
+"""Bakes the deformation of a range of frames."""
+
+import struct
+
+import bpy
+import cagework as cw
+import numpy as np
+
+from . import binding, operators
+
+
+class Bake(operators.BoundObjectOperator, bpy.types.Operator):
+    bl_idname = "cagework.bake"
+    bl_label = "Bake"
+    bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
+
+    form: bpy.props.EnumProperty(
+        name="Format",
+        items=[
+            ("KEYS", "Shape Keys", "A key per frame, with animated values"),
+            ("MDD", "MDD", "A file for the Mesh Cache modifier"),
+            ("PC2", "PC2", "A file for the Mesh Cache modifier"),
+        ],
+    )
+    first: bpy.props.IntProperty(name="First Frame", default=1)
+    last: bpy.props.IntProperty(name="Last Frame", default=250)
+    step: bpy.props.IntProperty(name="Step", default=1, min=1)
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", description="Without its extension")
+
+    def invoke(self, context, _event):
+        self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        self.filepath = self.filepath or f"//{operators.bound_mesh(context).name}"
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        scene, objects = context.scene, [o for o in operators.meshes(context) if o.data.cagework.stamp]
+        if self.form == "KEYS":
+            objects = list({o.data: o for o in objects}.values())
+        frames, current = list(range(self.first, self.last + 1, self.step)), scene.frame_current
+        if not frames:
+            return self.refuse(f"There are no frames from {self.first} to {self.last}")
+        for obj in objects:
+            if fault := binding.problem(obj, scene):
+                return self.refuse(fault)
+        for obj in objects:
+            remove_bake(obj)
+        context.window_manager.progress_begin(0, len(frames))
+        try:
+            poses = [self.poses(context, objects, frame) for frame in frames]
+        except cw.Error as error:
+            return self.refuse(str(error))
+        finally:
+            context.window_manager.progress_end()
+            scene.frame_set(current)
+        for obj, own in zip(objects, zip(*poses)):
+            if self.form == "KEYS":
+                self.to_keys(obj, frames, own)
+                continue
+            name = self.filepath if len(objects) == 1 else f"{self.filepath} {bpy.path.clean_name(obj.name)}"
+            try:
+                self.to_file(obj, name, frames, own, scene.render.fps / scene.render.fps_base)
+            except OSError as error:
+                return self.refuse(f"The file was not written: {error}")
+        return {"FINISHED"}
+
+    def poses(self, context, objects, frame):
+        """For each object, shape and value of the key that follows the cage; for a file, the mix of all shape keys."""
+        context.scene.frame_set(frame)
+        context.window_manager.progress_update((frame - self.first) // self.step)
+        found = []
+        for obj in objects:
+            if fault := binding.follow(obj, context.evaluated_depsgraph_get()):
+                raise cw.Error(fault)
+            live = obj.data.shape_keys.key_blocks[binding.KEY]
+            found.append((binding.coordinates(live.points), live.value) if self.form == "KEYS" else binding.mixed(obj))
+        return found
+
+    def to_keys(self, obj, frames, poses):
+        live, names = obj.data.shape_keys.key_blocks[binding.KEY], []
+        for frame, (shape, strength) in zip(frames, poses):
+            key = operators.copy_key(obj, f"Cage {frame}")
+            key.slider_min, key.slider_max = live.slider_min, live.slider_max
+            key.points.foreach_set("co", shape.astype(np.float32).ravel())
+            near = [(frame - self.step, 0.0), (frame, strength), (frame + self.step, 0.0)]
+            for at, value in near[(frame == frames[0]) : 3 - (frame == frames[-1])]:
+                key.value = value
+                key.keyframe_insert("value", frame=at)
+            names.append(key.name)
+            for point in next(c for c in curves(obj.data.shape_keys) if c.data_path == value_path(key)).keyframe_points:
+                point.interpolation = "LINEAR"
+        live.mute, obj.data.cagework.baked = True, "\n".join(names)
+
+    def to_file(self, obj, name, frames, shapes, fps):
+        path = f"{bpy.path.abspath(name)}.{self.form.lower()}"
+        with open(path, "wb") as file:
+            if self.form == "MDD":
+                file.write(struct.pack(">2i", len(shapes), len(shapes[0])))
+                file.write((np.array(frames) / fps).astype(">f4").tobytes())
+                file.writelines(shape.astype(">f4").tobytes() for shape in shapes)
+            else:
+                header = (b"POINTCACHE2\0", 1, len(shapes[0]), frames[0], self.step, len(shapes))
+                file.write(struct.pack("<12siiffi", *header))
+                file.writelines(shape.astype("<f4").tobytes() for shape in shapes)
+        cache = obj.modifiers.new(f"Cagework {self.form}", "MESH_CACHE")
+        cache.cache_format, cache.filepath, cache.frame_start = self.form, self.filepath_of(path), frames[0] / self.step
+        cache.frame_scale = 1 / self.step  # Blender subtracts `frame_start` from the scaled frame.
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+    def filepath_of(self, path):
+        return bpy.path.relpath(path) if self.filepath.startswith("//") else path
+
+
+def curves(data):
+    """The F-curves of animated data."""
+    return [curve for group in curve_groups(data) for curve in group]
+
+
+def curve_groups(data):
+    """The collections of F-curves of animated data, in the actions of Blender 4 and 5."""
+    action = data.animation_data.action if data.animation_data else None
+    if action is None or hasattr(action, "fcurves"):
+        return [action.fcurves] if action else []
+    return [bag.fcurves for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+
+
+def value_path(key):
+    """Path from the shape keys to the value of one of them."""
+    return f'key_blocks["{bpy.utils.escape_identifier(key.name)}"].value'
+
+
+def remove_bake(obj):
+    """Removes what the last bake of a mesh made, so that the live shape key deforms it again."""
+    for form in ["MDD", "PC2"]:
+        if cache := obj.modifiers.get(f"Cagework {form}"):
+            obj.modifiers.remove(cache)
+    keys, names = obj.data.shape_keys, obj.data.cagework.baked
+    for key in [keys.key_blocks[name] for name in names.split("\n") if name in keys.key_blocks]:
+        for group in curve_groups(keys):
+            for curve in [c for c in group if c.data_path == value_path(key)]:
+                group.remove(curve)
+        obj.shape_key_remove(key)
+    if names:
+        keys.key_blocks[binding.KEY].mute, obj.data.cagework.baked = False, ""
+
+
+CLASSES = [Bake]
