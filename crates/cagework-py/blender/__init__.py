@@ -2,11 +2,17 @@
 
 import bpy
 
-from . import bake, binding, operators, panel
+from . import animation, bake, binding, operators, panel
 
 CLASSES = [binding.Binding, *operators.CLASSES, *bake.CLASSES, panel.Panel]
 HANDLERS = ["depsgraph_update_post", "frame_change_post"]
 RESET_EVENTS = ["undo_post", "redo_post", "load_post"]
+
+
+def glTF2_pre_export_callback(export_settings):
+    """Blender's glTF exporter calls this function by its name before an export, and shows the warnings."""
+    for text in animation.warnings(bpy.context.scene, exported=True).values():
+        export_settings["log"].warning(f"Cagework: {text}", popup=True)
 
 
 def register():

@@ -6,34 +6,16 @@ import bpy
 import cagework as cw
 import numpy as np
 
-from . import binding, operators
+from . import animation, binding, operators
 
 
-class Bake(operators.BoundObjectOperator, bpy.types.Operator):
-    bl_idname = "cagework.bake"
-    bl_label = "Bake"
-    bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
+class Baking(operators.BoundObjectOperator):
+    """Base class of operators that bake."""
 
-    form: bpy.props.EnumProperty(
-        name="Format",
-        items=[
-            ("KEYS", "Shape Keys", "A key per frame, with animated values"),
-            ("MDD", "MDD", "A file for the Mesh Cache modifier"),
-            ("PC2", "PC2", "A file for the Mesh Cache modifier"),
-        ],
-    )
-    first: bpy.props.IntProperty(name="First Frame", default=1)
-    last: bpy.props.IntProperty(name="Last Frame", default=250)
-    step: bpy.props.IntProperty(name="Step", default=1, min=1)
-    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", description="Without its extension")
+    form, step, filepath = "KEYS", 1, ""
 
-    def invoke(self, context, _event):
-        self.first, self.last = context.scene.frame_start, context.scene.frame_end
-        self.filepath = self.filepath or f"//{operators.bound_mesh(context).name}"
-        return context.window_manager.invoke_props_dialog(self)
-
-    def execute(self, context):
-        scene, objects = context.scene, [o for o in operators.meshes(context) if o.data.cagework.stamp]
+    def bake(self, context, objects):
+        scene = context.scene
         if self.form == "KEYS":
             objects = list({o.data: o for o in objects}.values())
         frames, current = list(range(self.first, self.last + 1, self.step)), scene.frame_current
@@ -53,18 +35,27 @@ class Bake(operators.BoundObjectOperator, bpy.types.Operator):
             context.window_manager.progress_end()
             scene.frame_set(current)
         for obj, own in zip(objects, zip(*poses)):
-            if self.form == "KEYS":
-                self.to_keys(obj, frames, own)
-                continue
+            shapes, cages = zip(*own)
             name = self.filepath if len(objects) == 1 else f"{self.filepath} {bpy.path.clean_name(obj.name)}"
             try:
-                self.to_file(obj, name, frames, own, scene.render.fps / scene.render.fps_base)
+                if self.form == "KEYS":
+                    self.to_keys(obj, frames, shapes)
+                else:
+                    self.to_file(obj, name, frames, shapes, scene.render.fps / scene.render.fps_base)
             except OSError as error:
                 return self.refuse(f"The file was not written: {error}")
+            bound = obj.data.cagework
+            bound.bake_first, bound.bake_step, bound.bake_count = self.first, self.step, len(frames)
+            bound.bake_poses, bound.bake_stamp = np.array(cages, np.float32).tobytes(), bound.stamp
+            bound.bake_curves = animation.digest(animation.sources(obj))
+            binding.seen(obj.data).outdated.clear()
         return {"FINISHED"}
 
     def poses(self, context, objects, frame):
-        """For each object, shape and value of the key that follows the cage; for a file, the mix of all shape keys."""
+        """For each object, what a frame stores, and the pose of its cage.
+
+        As keys, it stores shape and value of the key that follows the cage; as a file, the mix of all shape keys.
+        """
         context.scene.frame_set(frame)
         context.window_manager.progress_update((frame - self.first) // self.step)
         found = []
@@ -72,7 +63,8 @@ class Bake(operators.BoundObjectOperator, bpy.types.Operator):
             if fault := binding.follow(obj, context.evaluated_depsgraph_get()):
                 raise cw.Error(fault)
             live = obj.data.shape_keys.key_blocks[binding.KEY]
-            found.append((binding.coordinates(live.points), live.value) if self.form == "KEYS" else binding.mixed(obj))
+            shape = (binding.coordinates(live.points), live.value) if self.form == "KEYS" else binding.mixed(obj)
+            found.append((shape, binding.seen(obj.data).posed))
         return found
 
     def to_keys(self, obj, frames, poses):
@@ -86,7 +78,7 @@ class Bake(operators.BoundObjectOperator, bpy.types.Operator):
                 key.value = value
                 key.keyframe_insert("value", frame=at)
             names.append(key.name)
-            for point in next(c for c in curves(obj.data.shape_keys) if c.data_path == value_path(key)).keyframe_points:
+            for point in next(c for c in animation.curves(obj.data.shape_keys) if c.data_path == value_path(key)).keyframe_points:
                 point.interpolation = "LINEAR"
         live.mute, obj.data.cagework.baked = True, "\n".join(names)
 
@@ -110,17 +102,52 @@ class Bake(operators.BoundObjectOperator, bpy.types.Operator):
         return bpy.path.relpath(path) if self.filepath.startswith("//") else path
 
 
-def curves(data):
-    """The F-curves of animated data."""
-    return [curve for group in curve_groups(data) for curve in group]
+class Bake(Baking, bpy.types.Operator):
+    bl_idname = "cagework.bake"
+    bl_label = "Bake"
+    bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
+
+    form: bpy.props.EnumProperty(
+        name="Format",
+        items=[
+            ("KEYS", "Shape Keys", "A key per frame, with animated values"),
+            ("MDD", "MDD", "A file for the Mesh Cache modifier"),
+            ("PC2", "PC2", "A file for the Mesh Cache modifier"),
+        ],
+    )
+    first: bpy.props.IntProperty(name="First Frame", default=1)
+    last: bpy.props.IntProperty(name="Last Frame", default=250)
+    step: bpy.props.IntProperty(name="Step", default=1, min=1)
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", description="Without its extension")
+
+    def invoke(self, context, _event):
+        self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        self.filepath = self.filepath or f"//{operators.bound_mesh(context).name}"
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        return self.bake(context, [o for o in operators.meshes(context) if o.data.cagework.stamp])
 
 
-def curve_groups(data):
-    """The collections of F-curves of animated data, in the actions of Blender 4 and 5."""
-    action = data.animation_data.action if data.animation_data else None
-    if action is None or hasattr(action, "fcurves"):
-        return [action.fcurves] if action else []
-    return [bag.fcurves for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+class BakeForExport(Baking, bpy.types.Operator):
+    bl_idname = "cagework.bake_for_export"
+    bl_label = "Bake for Export"
+    bl_description = (
+        "Write the deformation of all meshes of the scene with an animated cage as shape keys, in the scene's frame range. "
+        "Bakes that are up to date are kept"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == "OBJECT" and bool(binding.owners(context.scene))
+
+    def execute(self, context):
+        self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        objects = list(animation.warnings(context.scene, exported=True))
+        if not objects:
+            self.report({"INFO"}, "Nothing to bake: no cage is animated, or the bakes are up to date")
+            return {"CANCELLED"}
+        return self.bake(context, objects)
 
 
 def value_path(key):
@@ -134,8 +161,10 @@ def remove_bake(obj):
         if cache := obj.modifiers.get(f"Cagework {form}"):
             obj.modifiers.remove(cache)
     keys, names = obj.data.shape_keys, obj.data.cagework.baked
+    action = keys.animation_data.action if keys.animation_data else None
+    obj.data.cagework.bake_count, obj.data.cagework.bake_poses = 0, b""
     for key in [keys.key_blocks[name] for name in names.split("\n") if name in keys.key_blocks]:
-        for group in curve_groups(keys):
+        for group in animation.curve_groups(action) if action else []:
             for curve in [c for c in group if c.data_path == value_path(key)]:
                 group.remove(curve)
         obj.shape_key_remove(key)
@@ -143,4 +172,4 @@ def remove_bake(obj):
         keys.key_blocks[binding.KEY].mute, obj.data.cagework.baked = False, ""
 
 
-CLASSES = [Bake]
+CLASSES = [Bake, BakeForExport]

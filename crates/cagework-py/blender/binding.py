@@ -17,6 +17,8 @@ from cagework._sparse import csr_array
 KEY = "Cagework"
 # A matrix counts as singular if its determinant is at most this fraction of the cube of its largest entry.
 MIN_DETERMINANT = 1e-12
+# Distance by which two equal shapes of a cage may differ, as a fraction of their size. Above rounding.
+SHAPE_TOLERANCE = 1e-5
 # Largest move of points that stay in place, as a fraction of the largest rounded number: a few roundings of float32.
 PLACE_TOLERANCE = 1e-6
 
@@ -43,6 +45,15 @@ class Binding(bpy.types.PropertyGroup):
     report: bpy.props.StringProperty()
     # Names of the shape keys of the last bake, one per line.
     baked: bpy.props.StringProperty()
+    # Frames of the last bake. A count of 0: there is no bake.
+    bake_first: bpy.props.IntProperty()
+    bake_step: bpy.props.IntProperty(default=1)
+    bake_count: bpy.props.IntProperty()
+    # Poses of the cage in these frames, [bake_count, n_cage, 3] float32, bind space.
+    bake_poses: bpy.props.StringProperty(subtype="BYTE_STRING")
+    # `stamp` when baked, and the digest of the F-curves.
+    bake_stamp: bpy.props.StringProperty()
+    bake_curves: bpy.props.StringProperty()
 
 
 class Weights:
@@ -79,10 +90,12 @@ class Seen:
     """What the last update of a bound mesh has seen. None: no update yet.
 
     posed: [n_cage, 3], bind space; basis: [n_points, 3], local space; matrix: [4, 4], local to world space;
-    fault: why the mesh did not follow, a sentence; unbound: the n_points for which a new bind failed.
+    fault: why the mesh did not follow, a sentence; unbound: the n_points for which a new bind failed;
+    outdated: frames in which the cage had another pose than in the bake.
     """
 
     def __init__(self):
+        self.outdated = set()
         self.posed = self.basis = self.matrix = self.fault = self.unbound = None
 
 
@@ -393,6 +406,19 @@ def on_update(scene, depsgraph=None):
                 rebind(obj, depsgraph)
         elif not misfit(obj, scene):
             seen(mesh).fault = follow(obj, depsgraph)
+            if mesh.cagework.bake_count and not seen(mesh).fault:
+                compare_bake(mesh, scene)
+
+
+def compare_bake(mesh, scene):
+    """Remembers whether the pose of the cage in the current frame differs from the baked one."""
+    bound, last = mesh.cagework, seen(mesh)
+    k, between = divmod(scene.frame_current - bound.bake_first, bound.bake_step)
+    if between or scene.frame_subframe or not 0 <= k < bound.bake_count:
+        return
+    baked = np.frombuffer(bound.bake_poses, np.float32).reshape(bound.bake_count, -1, 3)[k]
+    same = baked.shape == last.posed.shape and np.abs(baked - last.posed).max() <= SHAPE_TOLERANCE * np.ptp(last.posed)
+    (last.outdated.discard if same else last.outdated.add)(scene.frame_current)
 
 
 def rebind(obj, depsgraph):

@@ -13,8 +13,6 @@ from . import binding
 
 # Seconds between two updates of the progress of a bind.
 INTERVAL = 0.05
-# Distance by which the shape of a cage may differ from its active shape key, as a fraction of its size. Above rounding.
-SHAPE_TOLERANCE = 1e-5
 
 
 def meshes(context):
@@ -210,7 +208,7 @@ def posed_points(cage):
 def mixes(cage):
     """Says that the shape of a cage differs from its `posed_points`, or returns None."""
     points = binding.coordinates(posed_points(cage))
-    if np.abs(binding.mixed(cage) - points).max() <= SHAPE_TOLERANCE * np.ptp(points, axis=0).max():
+    if np.abs(binding.mixed(cage) - points).max() <= binding.SHAPE_TOLERANCE * np.ptp(points, axis=0).max():
         return None
     return f"{cage.name} mixes shape keys: set the active key to 1 and the others to 0"
 

@@ -234,7 +234,7 @@ def test_renders_show_the_pose_of_a_cage_that_is_hidden_in_renders(body, keyed, 
     target.keyframe_insert(path, frame=1)
     setattr(target, path, (1, 0, 0) if keyed == "location" else 1)
     target.keyframe_insert(path, frame=3)
-    for curve in EXTENSION.bake.curves(target.id_data):
+    for curve in EXTENSION.animation.curves(target.id_data):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
     material = bpy.data.materials.new("Glow")
