@@ -68,7 +68,7 @@ class Weights:
         with np.load(io.BytesIO(archive), allow_pickle=False) as file:
             self.rows, self.rest, self.cage_local = file["rows"], file["rest"], file["cage_local"]
             frames = str(file["frames"])
-            self.matrix, self.extra = None, None
+            self.matrix, self.extra, self.puller, self.pulled = None, None, None, None
             if "offsets" in file:
                 self.extra = {"frames": json.loads(frames), "offsets": entries(file["offsets"])}
                 self.rested = cw.deform(self.sparse(), self.rest, self.extra)
@@ -78,6 +78,15 @@ class Weights:
         if self.matrix is None:
             self.matrix = sparse(self.rows)
         return self.matrix
+
+    def pull_of(self, points, triangles, cage, depsgraph, grid):
+        """The puller of the mesh with these points and triangles, bind space. Prepares it once per bind and shape."""
+        if self.pulled is None or not all(map(np.array_equal, self.pulled, (points, triangles))):
+            _, faces = cage_mesh(cage, depsgraph)
+            solid = cw.Cage(self.rest, [face.tolist() for face in faces])
+            self.puller = cw.Puller(points, triangles, solid, self.sparse(), report=self.extra, grid=grid)
+            self.pulled = points, triangles
+        return self.puller
 
     def displacements(self, posed):
         """Displacements of the points in a pose of the cage, [n_points, 3], bind space."""

@@ -249,8 +249,10 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.triangles = corners.reshape(-1, 3)
         to_bind = binding.to_bind(mesh)
         self.rest = binding.transform(binding.basis(mesh), to_bind)
-        _, faces = binding.cage_mesh(cage, depsgraph)
-        self.solid = cw.Cage(self.weights.rest, [face.tolist() for face in faces])
+        try:
+            self.puller = self.weights.pull_of(self.rest, self.triangles, cage, depsgraph, mesh.cagework.grid)
+        except cw.Error as error:
+            return str(error)
         self.posed = binding.posed_cage(self.obj, depsgraph)
         self.moved = self.rest + self.weights.displacements(self.posed)
         self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(to_bind)
@@ -258,10 +260,9 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.before = binding.coordinates(posed_points(cage))
         return None
 
-    def pull(self, vertex, world_target):
-        to = binding.transform(np.array([world_target]), np.linalg.inv(self.to_world))
-        options = {"start": self.posed, "report": self.weights.extra, "grid": self.obj.data.cagework.grid}
-        posed = cw.pull(self.rest, self.triangles, self.solid, self.weights.sparse(), [vertex], to, **options)
+    def pull(self, solve, world_target):
+        """Sets the pose of the cage that a function returns for the targets of the grabs."""
+        posed = solve(binding.transform(np.array([world_target]), np.linalg.inv(self.to_world)))
         write_cage(self.cage, binding.transform(binding.transform(posed, self.to_world), self.world_to_cage))
 
     def execute(self, context):
@@ -271,7 +272,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
             return self.refuse(f"There is no vertex {self.vertex}; {self.obj.name} has {len(self.rest)}")
         at = binding.transform(self.moved[[self.vertex]], self.to_world)[0]
         try:
-            self.pull(self.vertex, at + np.array(self.offset))
+            self.pull(lambda to: self.puller.pull([self.vertex], to, start=self.posed), at + np.array(self.offset))
         except cw.Error as error:
             return self.refuse(str(error))
         return {"FINISHED"}
@@ -284,7 +285,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.tree = BVHTree.FromPolygons(
             binding.transform(self.moved, self.to_world).tolist(), self.triangles.tolist()
         )
-        self.dragging = False
+        self.drag = None
         context.workspace.status_text_set("Cagework: drag a point of the mesh (Esc: cancel)")
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -305,14 +306,14 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
                 world = binding.transform(self.moved[self.triangles[face]], self.to_world)
                 nearest = int(np.linalg.norm(world - np.array(hit), axis=1).argmin())
                 self.vertex, self.at = int(self.triangles[face][nearest]), Vector(world[nearest])
-                self.dragging = True
-            elif event.type == "MOUSEMOVE" and self.dragging:
+                self.drag = self.puller.drag([self.vertex], start=self.posed)
+            elif event.type == "MOUSEMOVE" and self.drag:
                 target = view3d_utils.region_2d_to_location_3d(region, view, mouse, self.at)
                 self.offset = target - self.at
-                self.pull(self.vertex, np.array(target))
-            elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self.dragging:
+                self.pull(self.drag.to, np.array(target))
+            elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self.drag:
                 return self.end(context, {"FINISHED"})
-            elif not self.dragging and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
+            elif not self.drag and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
                 return {"PASS_THROUGH"}
         except cw.Error as error:
             write_cage(self.cage, self.before)

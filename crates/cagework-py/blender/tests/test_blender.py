@@ -573,6 +573,22 @@ def test_pulled_vertex_reaches_its_target():
     assert np.abs((world(body) - before)[top] - [0.2, 0.1, 0.3]).max() < 0.02
 
 
+def test_pull_is_prepared_once_per_bind_and_shape_of_the_mesh(body, monkeypatch):
+    bind(body)
+    prepared, Puller = [], cw.Puller
+    monkeypatch.setattr(cw, "Puller", lambda *given, **options: prepared.append(given[0]) or Puller(*given, **options))
+
+    def pull(offset):
+        assert bpy.ops.cagework.pull(vertex=3, offset=offset) == {"FINISHED"}
+        return len(prepared)
+
+    assert [pull((0.1, 0, 0)), pull((0, 0.1, 0))] == [1, 1]
+    body.data.shape_keys.reference_key.points.foreach_set("co", (1.1 * binding.basis(body.data)).astype(np.float32).ravel())
+    assert pull((0.1, 0, 0)) == 2 and np.array_equal(prepared[1], binding.basis(body.data))
+    bpy.ops.cagework.bind()
+    assert pull((0.1, 0, 0)) == 3
+
+
 def test_bind_in_a_window_reports_progress_and_stores_the_weights_at_the_end(body):
     cage = bind(body)
     points, rest = world(body), local(cage.data)
@@ -661,7 +677,7 @@ def test_pull_refuses_a_cage_that_mixes_shape_keys_and_restores_it_after_a_fault
     modal.send("LEFTMOUSE", "PRESS", (modal.region.width / 2, modal.region.height / 2))
     modal.send("MOUSEMOVE", at=(modal.region.width / 2 + 30, modal.region.height / 2))
     assert not np.array_equal(binding.coordinates(wide.points), before)
-    modal.operator.posed = modal.operator.posed * np.nan
+    modal.operator.to_world = modal.operator.to_world * np.nan
     assert modal.send("MOUSEMOVE", at=(0, 0)) == {"CANCELLED"} and modal.reports[0][0] == {"ERROR"}
     assert np.array_equal(binding.coordinates(wide.points), before)
 
