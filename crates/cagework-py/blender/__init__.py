@@ -19,6 +19,7 @@ def register():
     for each in CLASSES:
         bpy.utils.register_class(each)
     bpy.types.Mesh.cagework = bpy.props.PointerProperty(type=binding.Binding)
+    setattr(bpy.types.Object, binding.POSE, bpy.props.FloatProperty())
     for name in HANDLERS:
         getattr(bpy.app.handlers, name).append(binding.on_update)
     for name in RESET_EVENTS:
@@ -31,5 +32,6 @@ def unregister():
     for name in RESET_EVENTS:
         getattr(bpy.app.handlers, name).remove(binding.forget)
     del bpy.types.Mesh.cagework
+    delattr(bpy.types.Object, binding.POSE)
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

@@ -254,7 +254,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         except cw.Error as error:
             return str(error)
         self.posed = binding.posed_cage(self.obj, depsgraph)
-        self.moved = self.rest + self.weights.displacements(self.posed)
+        self.moved = self.rest + self.weights.displacements(self.posed, np.eye(3))
         self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(to_bind)
         self.world_to_cage = np.linalg.inv(np.array(cage.matrix_world))
         self.before = binding.coordinates(posed_points(cage))
@@ -362,7 +362,7 @@ class Unbind(BoundObjectOperator, bpy.types.Operator):
                 obj.shape_key_remove(keys.key_blocks[binding.KEY])
             if obj.data.shape_keys and len(obj.data.shape_keys.key_blocks) == 1:
                 obj.shape_key_clear()
-            obj.data.driver_remove("cagework.pose")
+            binding.release(obj.data)
             obj.data.cagework.stamp, obj.data.cagework.weights, obj.data.cagework.report = "", b"", ""
         return {"FINISHED"}
 
