@@ -20,6 +20,7 @@ def register():
         bpy.utils.register_class(each)
     bpy.types.Mesh.cagework = bpy.props.PointerProperty(type=binding.Binding)
     setattr(bpy.types.Object, binding.POSE, bpy.props.FloatProperty())
+    setattr(bpy.types.Object, binding.MADE, bpy.props.BoolProperty())
     for name in HANDLERS:
         getattr(bpy.app.handlers, name).append(binding.on_update)
     for name in RESET_EVENTS:
@@ -33,5 +34,6 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(binding.forget)
     del bpy.types.Mesh.cagework
     delattr(bpy.types.Object, binding.POSE)
+    delattr(bpy.types.Object, binding.MADE)
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

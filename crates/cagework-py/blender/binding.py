@@ -16,6 +16,8 @@ from bpy.app.handlers import persistent
 from cagework._sparse import csr_array
 
 KEY = "Cagework"
+# Whether *Make Cage* made an object. A property of objects.
+MADE = "cagework_made"
 # A property of objects. A driver reads the cage into it, so that Blender evaluates the cage wherever it evaluates the
 # object: without it, a cage that is hidden in renders keeps its last pose there.
 POSE = "cagework_pose"
@@ -25,6 +27,10 @@ MIN_DETERMINANT = 1e-12
 SHAPE_TOLERANCE = 1e-5
 # Largest move of points that stay in place, as a fraction of the largest rounded number: a few roundings of float32.
 PLACE_TOLERANCE = 1e-6
+
+
+# Property of a mesh in the panel, and of *Make Cage*.
+VERTICES = {"name": "Vertices", "description": "Largest number of vertices of the cage", "default": 80, "min": 8, "max": 400}
 
 
 class Binding(bpy.types.PropertyGroup):
@@ -37,6 +43,7 @@ class Binding(bpy.types.PropertyGroup):
     bound_cage: bpy.props.PointerProperty(type=bpy.types.Object)
     # The object whose space the cage is mapped to, if several objects share the mesh.
     owner: bpy.props.PointerProperty(type=bpy.types.Object)
+    vertices: bpy.props.IntProperty(**VERTICES)
     grid: bpy.props.IntProperty(
         name="Grid", description="Cells along the longest side of the cage", default=64, min=8, max=512
     )

@@ -50,9 +50,12 @@ class BoundObjectOperator:
 class MakeCage(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.make_cage"
     bl_label = "Make Cage"
-    bl_description = "Make a cage around the selected meshes, without their modifiers and shape keys"
+    bl_description = (
+        "Make a cage around the selected meshes, without their modifiers and shape keys. Replaces the cage that was made "
+        "for them before"
+    )
 
-    vertices: bpy.props.IntProperty(name="Vertices", description="Largest number of vertices", default=80, min=8, max=400)
+    vertices: bpy.props.IntProperty(**binding.VERTICES)
     kind: bpy.props.EnumProperty(
         name="Kind",
         items=[
@@ -88,6 +91,8 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
         except cw.Error as error:
             return self.refuse(f"No cage was made: {error}")
         first = objects[0]
+        for old in made_cages(objects):
+            remove_cage(old)
         local = binding.transform(made.vertices, first.matrix_world.inverted())
         mesh = bpy.data.meshes.new(f"{first.name} Cage")
         mesh.from_pydata(local.tolist(), [], [face.tolist() for face in made.faces])
@@ -97,9 +102,36 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
         # not its object.
         cage.parent = first
         cage.display_type, cage.show_in_front, cage.hide_render = "WIRE", True, True
+        setattr(cage, binding.MADE, True)
         for obj in objects:
-            obj.data.cagework.cage = cage
+            obj.data.cagework.cage, obj.data.cagework.vertices = cage, self.vertices
+        if context.active_object is None:  # The replaced cage was active.
+            context.view_layer.objects.active = first
+            first.select_set(True)
         return {"FINISHED"}
+
+
+def made_cages(objects):
+    """The cages of objects that *Make Cage* made and that no other mesh uses."""
+    chosen = {o.data for o in objects}
+    found = {mesh.cagework.cage for mesh in chosen}
+    others = [mesh.cagework for mesh in bpy.data.meshes if mesh not in chosen]
+    found -= {each for bound in others for each in (bound.cage, bound.bound_cage)}
+    return [cage for cage in found if cage and getattr(cage, binding.MADE) and not cage.library]
+
+
+def remove_cage(cage):
+    """Deletes a cage and what refers to it."""
+    for mesh in bpy.data.meshes:
+        if mesh.cagework.bound_cage == cage:
+            mesh.cagework.bound_cage = None
+            binding.release(mesh)
+        if mesh.cagework.cage == cage:
+            mesh.cagework.cage = None
+    data = cage.data
+    bpy.data.objects.remove(cage)
+    if not data.users:
+        bpy.data.meshes.remove(data)
 
 
 class Bind(BoundObjectOperator, bpy.types.Operator):

@@ -43,7 +43,9 @@ class Panel(bpy.types.Panel):
         obj = chosen[0]
         bound = obj.data.cagework
         layout.label(text=obj.name if len(chosen) == 1 else f"{obj.name} and {len(chosen) - 1} more", icon="MESH_DATA")
-        layout.operator("cagework.make_cage")
+        row = layout.row(align=True)
+        row.operator("cagework.make_cage").vertices = bound.vertices
+        row.prop(bound, "vertices")
         layout.prop(bound, "cage")
         layout.prop(bound, "grid")
         row = layout.row(align=True)

@@ -24,8 +24,9 @@ class Layout:
 
     def operator(self, name, text=""):
         assert getattr(bpy.ops.cagework, name.split(".")[1]).get_rna_type()
-        self.drawn.append(("operator", name))
-        return SimpleNamespace()
+        properties = SimpleNamespace()
+        self.drawn.append(("operator", name, properties))
+        return properties
 
     def box(self):
         return Layout(self.drawn)
@@ -51,7 +52,7 @@ def draw(width=300):
 
 
 def labels(drawn):
-    return [text for kind, text in drawn if kind == "label"]
+    return [text for kind, text, *_ in drawn if kind == "label"]
 
 
 @pytest.mark.parametrize("width", [240, 400, 1200])
@@ -75,7 +76,16 @@ def test_word_wider_than_the_panel_has_a_line_of_its_own():
 
 def test_bound_mesh_has_all_operators(body):
     select(body)
-    assert [name for kind, name in draw() if kind == "operator"] == ["cagework.make_cage", "cagework.bind"]
+    assert [name for kind, name, *_ in draw() if kind == "operator"] == ["cagework.make_cage", "cagework.bind"]
     bind(body)
-    drawn = {name for kind, name in draw() if kind == "operator"}
+    drawn = {name for kind, name, *_ in draw() if kind == "operator"}
     assert drawn == {each.bl_idname for module in [EXTENSION.operators, EXTENSION.bake] for each in module.CLASSES}
+
+
+def test_number_of_vertices_in_the_panel_is_that_of_the_next_cage(body):
+    select(body)
+    body.data.cagework.vertices = 30
+    assert ("prop", "vertices") in draw()
+    made = next(properties for _, name, *properties in draw() if name == "cagework.make_cage")[0]
+    assert bpy.ops.cagework.make_cage(**vars(made)) == {"FINISHED"}
+    assert 8 <= len(body.data.cagework.cage.data.vertices) <= 30
