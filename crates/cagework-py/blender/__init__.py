@@ -2,9 +2,9 @@
 
 import bpy
 
-from . import animation, bake, binding, operators, panel
+from . import animation, bake, binding, operators, panel, rig
 
-CLASSES = [binding.Binding, *operators.CLASSES, *bake.CLASSES, panel.Panel]
+CLASSES = [binding.Binding, *operators.CLASSES, *bake.CLASSES, *rig.CLASSES, panel.Panel]
 HANDLERS = ["depsgraph_update_post", "frame_change_post"]
 RESET_EVENTS = ["undo_post", "redo_post", "load_post"]
 
@@ -21,6 +21,7 @@ def register():
     bpy.types.Mesh.cagework = bpy.props.PointerProperty(type=binding.Binding)
     setattr(bpy.types.Object, binding.POSE, bpy.props.FloatProperty())
     setattr(bpy.types.Object, binding.MADE, bpy.props.BoolProperty())
+    setattr(bpy.types.Armature, rig.RIG, bpy.props.StringProperty())
     for name in HANDLERS:
         getattr(bpy.app.handlers, name).append(binding.on_update)
     for name in RESET_EVENTS:
@@ -35,5 +36,6 @@ def unregister():
     del bpy.types.Mesh.cagework
     delattr(bpy.types.Object, binding.POSE)
     delattr(bpy.types.Object, binding.MADE)
+    delattr(bpy.types.Armature, rig.RIG)
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

@@ -64,5 +64,5 @@ class Panel(bpy.types.Panel):
         if sharing:
             notice(layout, context, f"{sharing} linked duplicates take the same shape", "INFO")
         column = layout.column(align=True)
-        for name in ["pull", "reset", "save_key", "bake", "bake_for_export", "unbind"]:
+        for name in ["pull", "reset", "save_key", "bake", "bake_for_export", "apply_to_armature", "unbind"]:
             column.operator(f"cagework.{name}")

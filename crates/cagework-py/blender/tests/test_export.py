@@ -201,15 +201,6 @@ def test_file_for_the_mesh_cache_modifier_is_no_bake_for_exporters_of_shape_keys
     assert "no baked shape keys" in animation.warning(body, scene, exported=True)
 
 
-@pytest.fixture
-def gltf():
-    """Blender's glTF add-on, which calls the extension like an installed one."""
-    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
-    bpy.context.preferences.addons.new().module = EXTENSION.__name__
-    yield
-    bpy.context.preferences.addons.remove(bpy.context.preferences.addons[EXTENSION.__name__])
-
-
 def test_exported_gltf_warns_without_a_bake_and_plays_with_it(body, gltf, tmp_path, capfd):
     cage, scene, path = bind(body), bpy.context.scene, str(tmp_path / "a.glb")
     scene.frame_start, scene.frame_end = 1, 9

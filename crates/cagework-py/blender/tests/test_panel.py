@@ -79,7 +79,7 @@ def test_bound_mesh_has_all_operators(body):
     assert [name for kind, name, *_ in draw() if kind == "operator"] == ["cagework.make_cage", "cagework.bind"]
     bind(body)
     drawn = {name for kind, name, *_ in draw() if kind == "operator"}
-    assert drawn == {each.bl_idname for module in [EXTENSION.operators, EXTENSION.bake] for each in module.CLASSES}
+    assert drawn == {each.bl_idname for module in [EXTENSION.operators, EXTENSION.bake, EXTENSION.rig] for each in module.CLASSES}
 
 
 def test_number_of_vertices_in_the_panel_is_that_of_the_next_cage(body):
