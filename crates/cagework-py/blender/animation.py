@@ -49,7 +49,12 @@ def changes(data):
     drivers = data.animation_data.drivers if data.animation_data else []
     if any(each.driver.type == "SCRIPTED" and "frame" in each.driver.expression for each in drivers):
         return True
-    return any(len(c.modifiers) or len(c.sampled_points) or np.ptp(keyframes(c)[:, 1::2]) for c in curves(data))
+    return any(len(c.modifiers) or len(c.sampled_points) or is_curved(c) for c in curves(data))
+
+
+def is_curved(curve):
+    """Whether values or handles of keyframes differ."""
+    return len(curve.keyframe_points) and np.ptp(keyframes(curve)[:, 1::2])
 
 
 def line(obj):

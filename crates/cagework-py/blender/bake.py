@@ -172,4 +172,20 @@ def remove_bake(obj):
         keys.key_blocks[binding.KEY].mute, obj.data.cagework.baked = False, ""
 
 
-CLASSES = [Bake, BakeForExport]
+class RemoveBake(operators.BoundObjectOperator, bpy.types.Operator):
+    bl_idname = "cagework.remove_bake"
+    bl_label = "Remove Bake"
+    bl_description = "Remove the baked keys or the Mesh Cache modifier, so that the mesh follows the cage again"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(animation.form_of_bake(o) for o in operators.meshes(context))
+
+    def execute(self, context):
+        for obj in operators.meshes(context):
+            if obj.data.cagework.stamp:
+                remove_bake(obj)
+        return {"FINISHED"}
+
+
+CLASSES = [Bake, BakeForExport, RemoveBake]

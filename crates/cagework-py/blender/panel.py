@@ -3,10 +3,19 @@
 import blf
 import bpy
 
-from . import animation, binding, operators
+from . import animation, bake, binding, operators, rig
 
 # Width of borders and of an icon, and size of the text, in pixels at a resolution scale of 1.
 BORDERS, ICON, TEXT = 40, 20, 11
+# Operators for a bound mesh.
+ACTIONS = [
+    operators.Pull,
+    operators.Reset,
+    operators.SaveKey,
+    *bake.CLASSES,
+    *rig.CLASSES,
+    operators.Unbind,
+]
 
 
 def wrapped(text, width, size):
@@ -27,7 +36,7 @@ def notice(layout, context, text, icon="NONE"):
     scale = context.preferences.system.ui_scale
     width = context.region.width - scale * (BORDERS + (ICON if icon != "NONE" else 0))
     for k, line in enumerate(wrapped(text, width, TEXT * scale)):
-        layout.label(text=line, icon=("BLANK1" if k else icon) if icon != "NONE" else icon)
+        layout.label(text=line, icon="BLANK1" if k and icon != "NONE" else icon)
 
 
 class Panel(bpy.types.Panel):
@@ -64,5 +73,5 @@ class Panel(bpy.types.Panel):
         if sharing:
             notice(layout, context, f"{sharing} linked duplicates take the same shape", "INFO")
         column = layout.column(align=True)
-        for name in ["pull", "reset", "save_key", "bake", "bake_for_export", "apply_to_armature", "unbind"]:
-            column.operator(f"cagework.{name}")
+        for each in ACTIONS:
+            column.operator(each.bl_idname)

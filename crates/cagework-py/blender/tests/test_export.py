@@ -111,7 +111,13 @@ def by_common_parent(body, cage):
     key(body.parent, "location", {1: (0, 0, 0), 9: (1, 0, 0)})
 
 
-@pytest.mark.parametrize("animate", [with_the_mesh, by_constant_keys, by_color, by_common_parent])
+def by_no_keys(_body, cage):
+    by_object(_body, cage)
+    for curve in animation.curves(cage):
+        curve.keyframe_points.clear()
+
+
+@pytest.mark.parametrize("animate", [with_the_mesh, by_constant_keys, by_no_keys, by_color, by_common_parent])
 def test_animation_that_does_not_deform_the_mesh_is_no_warning(body, animate):
     cage, scene = bind(body), bpy.context.scene
     animate(body, cage)
@@ -184,6 +190,20 @@ def test_undone_change_is_no_warning(baked):
     assert "was changed after the bake" in animation.warning(baked, scene)
     move(cage, [-0.1, 0, 0])
     assert animation.warning(baked, scene) is None
+
+
+@pytest.mark.parametrize("form", ["KEYS", "PC2"])
+def test_mesh_follows_the_cage_again_without_its_bake(body, form, tmp_path):
+    cage, scene = bind(body), bpy.context.scene
+    before = world(body)
+    by_object(body, cage)
+    select(body)
+    bpy.ops.cagework.bake(form=form, first=1, last=9, filepath=str(tmp_path / "baked"))
+    assert bpy.ops.cagework.remove_bake() == {"FINISHED"} and not bpy.ops.cagework.remove_bake.poll()
+    scene.frame_set(9)
+    cage.location.y = 2
+    assert np.abs(world(body) - before - [1, 2, 0]).max() < TOLERANCE
+    assert "has no bake" in animation.warning(body, scene)
 
 
 def test_deleted_keys_of_a_bake_are_a_warning(baked):
