@@ -79,7 +79,17 @@ def by_mesh_alone(body, cage):
     key(body, "location", {1: (0, 0, 0), 9: (1, 0, 0)})
 
 
-MOVES = [by_object, by_shape_key, by_armature, by_armature_of_both, by_lattice_through_a_parent, by_driver, by_modifier, by_strip, by_mesh_alone]
+MOVES = [
+    by_object,
+    by_shape_key,
+    by_armature,
+    by_armature_of_both,
+    by_lattice_through_a_parent,
+    by_driver,
+    by_modifier,
+    by_strip,
+    by_mesh_alone,
+]
 
 
 @pytest.mark.parametrize("animate", MOVES)
