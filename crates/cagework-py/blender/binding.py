@@ -6,6 +6,7 @@ is mapped to the mesh's local space and then by `to_bind`, so that moving mesh a
 
 import io
 import json
+from contextlib import contextmanager
 from uuid import uuid4
 
 import bpy
@@ -15,10 +16,21 @@ from bpy.app.handlers import persistent
 from cagework._sparse import csr_array
 
 KEY = "Cagework"
+# Whether *Make Cage* made an object. A property of objects.
+MADE = "cagework_made"
+# A property of objects. A driver reads the cage into it, so that Blender evaluates the cage wherever it evaluates the
+# object: without it, a cage that is hidden in renders keeps its last pose there.
+POSE = "cagework_pose"
 # A matrix counts as singular if its determinant is at most this fraction of the cube of its largest entry.
 MIN_DETERMINANT = 1e-12
+# Distance by which two equal shapes of a cage may differ, as a fraction of their size. Above rounding.
+SHAPE_TOLERANCE = 1e-5
 # Largest move of points that stay in place, as a fraction of the largest rounded number: a few roundings of float32.
 PLACE_TOLERANCE = 1e-6
+
+
+# Property of a mesh in the panel, and of *Make Cage*.
+VERTICES = {"name": "Vertices", "description": "Largest number of vertices of the cage", "default": 80, "min": 8, "max": 400}
 
 
 class Binding(bpy.types.PropertyGroup):
@@ -31,18 +43,25 @@ class Binding(bpy.types.PropertyGroup):
     bound_cage: bpy.props.PointerProperty(type=bpy.types.Object)
     # The object whose space the cage is mapped to, if several objects share the mesh.
     owner: bpy.props.PointerProperty(type=bpy.types.Object)
+    vertices: bpy.props.IntProperty(**VERTICES)
     grid: bpy.props.IntProperty(
         name="Grid", description="Cells along the longest side of the cage", default=64, min=8, max=512
     )
-    # A driver reads the cage into this number, so that Blender evaluates the cage wherever it evaluates the mesh:
-    # without it, a cage that is hidden in renders keeps its last pose there.
-    pose: bpy.props.FloatProperty()
     stamp: bpy.props.StringProperty()
     weights: bpy.props.StringProperty(subtype="BYTE_STRING")
     to_bind: bpy.props.StringProperty(subtype="BYTE_STRING")
     report: bpy.props.StringProperty()
     # Names of the shape keys of the last bake, one per line.
     baked: bpy.props.StringProperty()
+    # Frames of the last bake. A count of 0: there is no bake.
+    bake_first: bpy.props.IntProperty()
+    bake_step: bpy.props.IntProperty(default=1)
+    bake_count: bpy.props.IntProperty()
+    # Poses of the cage in these frames, [bake_count, n_cage, 3] float32, bind space.
+    bake_poses: bpy.props.StringProperty(subtype="BYTE_STRING")
+    # `stamp` when baked, and the digest of the F-curves.
+    bake_stamp: bpy.props.StringProperty()
+    bake_curves: bpy.props.StringProperty()
 
 
 class Weights:
@@ -57,32 +76,45 @@ class Weights:
         with np.load(io.BytesIO(archive), allow_pickle=False) as file:
             self.rows, self.rest, self.cage_local = file["rows"], file["rest"], file["cage_local"]
             frames = str(file["frames"])
-            self.matrix, self.extra = None, None
+            self.extra, self.puller, self.pulled = None, None, None
             if "offsets" in file:
                 self.extra = {"frames": json.loads(frames), "offsets": entries(file["offsets"])}
-                self.rested = cw.deform(self.sparse(), self.rest, self.extra)
+                self.outside = file["offsets"].any(axis=1).nonzero()[0]
+                offsets = entries(file["offsets"][self.outside])
+                self.part = sparse(self.rows[self.outside]), {**self.extra, "offsets": offsets}
+                self.rested = self.deformed(self.rest)
 
-    def sparse(self):
-        """The rows as a sparse matrix for cagework.deform."""
-        if self.matrix is None:
-            self.matrix = sparse(self.rows)
-        return self.matrix
+    def deformed(self, posed):
+        """Positions of the points with offsets in a pose of the cage, bind space."""
+        weights, extra = self.part
+        return cw.deform(weights, posed, extra)
 
-    def displacements(self, posed):
-        """Displacements of the points in a pose of the cage, [n_points, 3], bind space."""
-        if self.extra is None:
-            return self.rows @ (posed - self.rest).astype(np.float32)
-        return cw.deform(self.sparse(), posed, self.extra) - self.rested
+    def pull_of(self, points, triangles, cage, depsgraph, grid):
+        """The puller of the mesh with these points and triangles, bind space. Prepares it once per bind and shape."""
+        if self.pulled is None or not all(map(np.array_equal, self.pulled, (points, triangles))):
+            solid = cw.Cage(self.rest, cage_faces(cage, depsgraph))
+            self.puller = cw.Puller(points, triangles, solid, sparse(self.rows), report=self.extra, grid=grid)
+            self.pulled = points, triangles
+        return self.puller
+
+    def displacements(self, posed, matrix):
+        """Displacements [n_points, 3] of the points in a pose of the cage, times a matrix [3, 3] from bind space."""
+        moved = self.rows @ ((posed - self.rest) @ matrix.T).astype(np.float32)
+        if self.extra is not None:
+            moved[self.outside] = (self.deformed(posed) - self.rested) @ matrix.T
+        return moved
 
 
 class Seen:
     """What the last update of a bound mesh has seen. None: no update yet.
 
-    posed: [n_cage, 3], bind space; basis: [n_points, 3], local space; matrix: [4, 4], local to world space;
-    fault: why the mesh did not follow, a sentence; unbound: the n_points for which a new bind failed.
+    posed: [n_cage, 3], bind space; basis: [n_points, 3], float32, local space; matrix: [4, 4], local to world space;
+    fault: why the mesh did not follow, a sentence; unbound: the n_points for which a new bind failed;
+    outdated: frames in which the cage had another pose than in the bake.
     """
 
     def __init__(self):
+        self.outdated = set()
         self.posed = self.basis = self.matrix = self.fault = self.unbound = None
 
 
@@ -130,11 +162,16 @@ def to_bind(mesh):
     return np.frombuffer(mesh.cagework.to_bind).reshape(4, 4)
 
 
-def coordinates(points):
-    """Positions [n, 3] of vertices or of the points of a shape key."""
+def stored(points):
+    """Positions [n, 3] of vertices or of the points of a shape key, in float32 as Blender stores them."""
     flat = np.empty(3 * len(points), np.float32)
     points.foreach_get("co", flat)
-    return flat.reshape(-1, 3).astype(np.float64)
+    return flat.reshape(-1, 3)
+
+
+def coordinates(points):
+    """Positions [n, 3] of vertices or of the points of a shape key."""
+    return stored(points).astype(np.float64)
 
 
 def transform(points, matrix):
@@ -142,9 +179,14 @@ def transform(points, matrix):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def basis_points(mesh):
+    """The points of a mesh without its shape keys."""
+    return mesh.shape_keys.reference_key.points if mesh.shape_keys else mesh.vertices
+
+
 def basis(mesh):
     """Local positions of a mesh without its shape keys."""
-    return coordinates(mesh.shape_keys.reference_key.points if mesh.shape_keys else mesh.vertices)
+    return coordinates(basis_points(mesh))
 
 
 def mixed(obj):
@@ -175,23 +217,31 @@ def group_weights(obj, name):
     return weights
 
 
-def cage_mesh(cage, depsgraph):
-    """World positions and faces of a cage with its modifiers and shape keys, also in edit mode."""
-    evaluated = cage.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
+@contextmanager
+def evaluated_mesh(obj, depsgraph):
+    """The mesh of an object with its modifiers and shape keys, also in edit mode."""
+    evaluated = obj.evaluated_get(depsgraph)
     try:
-        corners = np.empty(len(mesh.loops), np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        starts = np.empty(len(mesh.polygons), np.int32)
-        mesh.polygons.foreach_get("loop_start", starts)
-        return transform(coordinates(mesh.vertices), evaluated.matrix_world), np.split(corners, starts[1:])
+        yield evaluated.to_mesh()
     finally:
         evaluated.to_mesh_clear()
 
 
+def cage_points(cage, depsgraph):
+    """World positions [n_cage, 3] of a cage with its modifiers and shape keys."""
+    with evaluated_mesh(cage, depsgraph) as mesh:
+        return transform(coordinates(mesh.vertices), evaluated_matrix(cage, depsgraph))
+
+
+def cage_faces(cage, depsgraph):
+    """Faces of a cage with its modifiers, a list of vertices each."""
+    with evaluated_mesh(cage, depsgraph) as mesh:
+        return [list(face.vertices) for face in mesh.polygons]
+
+
 def singular(matrix):
-    matrix = np.asarray(matrix, np.float64)[:3, :3]
-    return abs(np.linalg.det(matrix)) <= MIN_DETERMINANT * np.abs(matrix).max() ** 3
+    linear = matrix.to_3x3()
+    return abs(linear.determinant()) <= MIN_DETERMINANT * max(abs(x) for row in linear for x in row) ** 3
 
 
 def fixed(obj):
@@ -258,7 +308,7 @@ class Job:
 
     def __init__(self, objects, cage, depsgraph, grid, keep_rest=False):
         self.objects, self.cage, self.grid = objects, cage, grid
-        self.rest, faces = cage_mesh(cage, depsgraph)
+        self.rest, self.faces = cage_points(cage, depsgraph), cage_faces(cage, depsgraph)
         self.cage_local = mixed(cage)
         kept = [loaded(o.data) for o in objects if o.data.cagework.stamp and o.data.cagework.bound_cage == cage]
         kept = [old for old in kept if len(old.rest) == len(self.rest)]
@@ -269,7 +319,7 @@ class Job:
         else:
             self.to_bind = [np.array(o.matrix_world, np.float64) for o in objects]
         self.points = [transform(basis(o.data), m) for o, m in zip(objects, self.to_bind)]
-        self.faces, self.results = [face.tolist() for face in faces], None
+        self.results = None
 
     def solve(self, progress=None):
         cage = cw.Cage(self.rest, self.faces)
@@ -323,19 +373,33 @@ def live_key(obj):
 
 
 def drive(mesh):
-    """Makes a mesh depend on transform, shape keys and modifiers of its cage, by a driver."""
-    mesh.driver_remove("cagework.pose")
-    driver = mesh.driver_add("cagework.pose").driver
-    driver.type = "SUM"  # Unlike an expression, it needs no permission to run scripts.
-    for kind in ["TRANSFORMS", "SINGLE_PROP"]:
-        variable = driver.variables.new()
-        variable.type, variable.targets[0].id = kind, mesh.cagework.cage
-    variable.targets[0].data_path = "dimensions[0]"
+    """Makes the objects of a mesh depend on transform, shape keys and modifiers of its cage, by a driver.
+
+    A driver of the mesh would make Blender evaluate the mesh once more in each frame.
+    """
+    release(mesh)
+    for obj in objects_of(mesh):
+        driver = obj.driver_add(POSE).driver
+        driver.type = "SUM"  # Unlike an expression, it needs no permission to run scripts.
+        for kind in ["TRANSFORMS", "SINGLE_PROP"]:
+            variable = driver.variables.new()
+            variable.type, variable.targets[0].id = kind, mesh.cagework.cage
+        variable.targets[0].data_path = "dimensions[0]"
+
+
+def release(mesh):
+    """Removes the drivers that `drive` adds."""
+    for obj in objects_of(mesh):
+        obj.driver_remove(POSE)
+
+
+def objects_of(mesh):
+    return [obj for obj in bpy.data.objects if obj.data == mesh]
 
 
 def posed_cage(obj, depsgraph):
     """Returns the positions of the posed cage in the bind space of an object's mesh."""
-    world, _ = cage_mesh(obj.data.cagework.cage, depsgraph)
+    world = cage_points(obj.data.cagework.cage, depsgraph)
     return transform(world, to_bind(obj.data) @ np.linalg.inv(evaluated_matrix(obj, depsgraph)))
 
 
@@ -351,7 +415,7 @@ def reach(points, matrix):
 def keep_place(obj, matrix, last):
     """Adapts `to_bind` after Apply Scale, Set Origin and the like. They change the local points and the matrix of an
     object, and keep its points in world space."""
-    points = basis(obj.data)
+    points = stored(basis_points(obj.data))
     if last.basis is not None and len(points) == len(last.basis) and not np.array_equal(points, last.basis):
         move = np.abs(transform(points, matrix) - transform(last.basis, last.matrix)).max()
         if move <= PLACE_TOLERANCE * max(reach(points, matrix), reach(last.basis, last.matrix)):
@@ -370,10 +434,9 @@ def follow(obj, depsgraph):
         return f"The cage has {len(posed)} vertices and had {len(weights.rest)} when bound: undo that, or bind again"
     if last.posed is not None and np.array_equal(posed, last.posed):
         return None
-    moved = weights.displacements(posed) @ np.linalg.inv(to_bind(obj.data)[:3, :3]).T
-    points = live_key(obj).points
-    points.foreach_set("co", (last.basis + moved).astype(np.float32).ravel())
-    obj.data.update_tag()
+    moved = weights.displacements(posed, np.linalg.inv(to_bind(obj.data)[:3, :3]))
+    live_key(obj).points.foreach_set("co", (last.basis + moved).ravel())
+    obj.data.shape_keys.update_tag()
     last.posed = posed
     return None
 
@@ -393,6 +456,19 @@ def on_update(scene, depsgraph=None):
                 rebind(obj, depsgraph)
         elif not misfit(obj, scene):
             seen(mesh).fault = follow(obj, depsgraph)
+            if mesh.cagework.bake_count and not seen(mesh).fault:
+                compare_bake(mesh, scene)
+
+
+def compare_bake(mesh, scene):
+    """Remembers whether the pose of the cage in the current frame differs from the baked one."""
+    bound, last = mesh.cagework, seen(mesh)
+    k, between = divmod(scene.frame_current - bound.bake_first, bound.bake_step)
+    if between or scene.frame_subframe or not 0 <= k < bound.bake_count:
+        return
+    baked = np.frombuffer(bound.bake_poses, np.float32).reshape(bound.bake_count, -1, 3)[k]
+    same = baked.shape == last.posed.shape and np.abs(baked - last.posed).max() <= SHAPE_TOLERANCE * np.ptp(last.posed)
+    (last.outdated.discard if same else last.outdated.add)(scene.frame_current)
 
 
 def rebind(obj, depsgraph):

@@ -34,8 +34,9 @@ def build(wheel, out):
     out.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("blender_manifest.toml", manifest)
-        for source in ["__init__.py", "binding.py", "operators.py", "panel.py"]:
-            file.write(folder / source, source)
+        for source in sorted(folder.glob("*.py")):
+            if source != Path(__file__):
+                file.write(source, source.name)
         file.write(wheel, f"wheels/{wheel.name}")
     return archive
 

@@ -1,6 +1,5 @@
-"""Operators: make a cage, bind, pull, reset, save as shape key, bake, unbind."""
+"""Operators: make a cage, bind, pull, reset, save as shape key, unbind."""
 
-import struct
 import threading
 
 import bpy
@@ -14,8 +13,6 @@ from . import binding
 
 # Seconds between two updates of the progress of a bind.
 INTERVAL = 0.05
-# Distance by which the shape of a cage may differ from its active shape key, as a fraction of its size. Above rounding.
-SHAPE_TOLERANCE = 1e-5
 
 
 def meshes(context):
@@ -53,9 +50,12 @@ class BoundObjectOperator:
 class MakeCage(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.make_cage"
     bl_label = "Make Cage"
-    bl_description = "Make a cage around the selected meshes, without their modifiers and shape keys"
+    bl_description = (
+        "Make a cage around the selected meshes, without their modifiers and shape keys. Replaces the cage that was made "
+        "for them before"
+    )
 
-    vertices: bpy.props.IntProperty(name="Vertices", description="Largest number of vertices", default=80, min=8, max=400)
+    vertices: bpy.props.IntProperty(**binding.VERTICES)
     kind: bpy.props.EnumProperty(
         name="Kind",
         items=[
@@ -91,6 +91,8 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
         except cw.Error as error:
             return self.refuse(f"No cage was made: {error}")
         first = objects[0]
+        for old in made_cages(objects):
+            remove_cage(old)
         local = binding.transform(made.vertices, first.matrix_world.inverted())
         mesh = bpy.data.meshes.new(f"{first.name} Cage")
         mesh.from_pydata(local.tolist(), [], [face.tolist() for face in made.faces])
@@ -100,9 +102,36 @@ class MakeCage(BoundObjectOperator, bpy.types.Operator):
         # not its object.
         cage.parent = first
         cage.display_type, cage.show_in_front, cage.hide_render = "WIRE", True, True
+        setattr(cage, binding.MADE, True)
         for obj in objects:
-            obj.data.cagework.cage = cage
+            obj.data.cagework.cage, obj.data.cagework.vertices = cage, self.vertices
+        if context.active_object is None:  # The replaced cage was active.
+            context.view_layer.objects.active = first
+            first.select_set(True)
         return {"FINISHED"}
+
+
+def made_cages(objects):
+    """The cages of objects that *Make Cage* made and that no other mesh uses."""
+    chosen = {o.data for o in objects}
+    found = {mesh.cagework.cage for mesh in chosen}
+    others = [mesh.cagework for mesh in bpy.data.meshes if mesh not in chosen]
+    found -= {each for bound in others for each in (bound.cage, bound.bound_cage)}
+    return [cage for cage in found if cage and getattr(cage, binding.MADE) and not cage.library]
+
+
+def remove_cage(cage):
+    """Deletes a cage and what refers to it."""
+    for mesh in bpy.data.meshes:
+        if mesh.cagework.bound_cage == cage:
+            mesh.cagework.bound_cage = None
+            binding.release(mesh)
+        if mesh.cagework.cage == cage:
+            mesh.cagework.cage = None
+    data = cage.data
+    bpy.data.objects.remove(cage)
+    if not data.users:
+        bpy.data.meshes.remove(data)
 
 
 class Bind(BoundObjectOperator, bpy.types.Operator):
@@ -211,7 +240,7 @@ def posed_points(cage):
 def mixes(cage):
     """Says that the shape of a cage differs from its `posed_points`, or returns None."""
     points = binding.coordinates(posed_points(cage))
-    if np.abs(binding.mixed(cage) - points).max() <= SHAPE_TOLERANCE * np.ptp(points, axis=0).max():
+    if np.abs(binding.mixed(cage) - points).max() <= binding.SHAPE_TOLERANCE * np.ptp(points, axis=0).max():
         return None
     return f"{cage.name} mixes shape keys: set the active key to 1 and the others to 0"
 
@@ -252,19 +281,20 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.triangles = corners.reshape(-1, 3)
         to_bind = binding.to_bind(mesh)
         self.rest = binding.transform(binding.basis(mesh), to_bind)
-        _, faces = binding.cage_mesh(cage, depsgraph)
-        self.solid = cw.Cage(self.weights.rest, [face.tolist() for face in faces])
+        try:
+            self.puller = self.weights.pull_of(self.rest, self.triangles, cage, depsgraph, mesh.cagework.grid)
+        except cw.Error as error:
+            return str(error)
         self.posed = binding.posed_cage(self.obj, depsgraph)
-        self.moved = self.rest + self.weights.displacements(self.posed)
+        self.moved = self.rest + self.weights.displacements(self.posed, np.eye(3))
         self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(to_bind)
         self.world_to_cage = np.linalg.inv(np.array(cage.matrix_world))
         self.before = binding.coordinates(posed_points(cage))
         return None
 
-    def pull(self, vertex, world_target):
-        to = binding.transform(np.array([world_target]), np.linalg.inv(self.to_world))
-        options = {"start": self.posed, "report": self.weights.extra, "grid": self.obj.data.cagework.grid}
-        posed = cw.pull(self.rest, self.triangles, self.solid, self.weights.sparse(), [vertex], to, **options)
+    def pull(self, solve, world_target):
+        """Sets the pose of the cage that a function returns for the targets of the grabs."""
+        posed = solve(binding.transform(np.array([world_target]), np.linalg.inv(self.to_world)))
         write_cage(self.cage, binding.transform(binding.transform(posed, self.to_world), self.world_to_cage))
 
     def execute(self, context):
@@ -274,7 +304,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
             return self.refuse(f"There is no vertex {self.vertex}; {self.obj.name} has {len(self.rest)}")
         at = binding.transform(self.moved[[self.vertex]], self.to_world)[0]
         try:
-            self.pull(self.vertex, at + np.array(self.offset))
+            self.pull(lambda to: self.puller.pull([self.vertex], to, start=self.posed), at + np.array(self.offset))
         except cw.Error as error:
             return self.refuse(str(error))
         return {"FINISHED"}
@@ -287,7 +317,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.tree = BVHTree.FromPolygons(
             binding.transform(self.moved, self.to_world).tolist(), self.triangles.tolist()
         )
-        self.dragging = False
+        self.drag = None
         context.workspace.status_text_set("Cagework: drag a point of the mesh (Esc: cancel)")
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -308,14 +338,14 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
                 world = binding.transform(self.moved[self.triangles[face]], self.to_world)
                 nearest = int(np.linalg.norm(world - np.array(hit), axis=1).argmin())
                 self.vertex, self.at = int(self.triangles[face][nearest]), Vector(world[nearest])
-                self.dragging = True
-            elif event.type == "MOUSEMOVE" and self.dragging:
+                self.drag = self.puller.drag([self.vertex], start=self.posed)
+            elif event.type == "MOUSEMOVE" and self.drag:
                 target = view3d_utils.region_2d_to_location_3d(region, view, mouse, self.at)
                 self.offset = target - self.at
-                self.pull(self.vertex, np.array(target))
-            elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self.dragging:
+                self.pull(self.drag.to, np.array(target))
+            elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self.drag:
                 return self.end(context, {"FINISHED"})
-            elif not self.dragging and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
+            elif not self.drag and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
                 return {"PASS_THROUGH"}
         except cw.Error as error:
             write_cage(self.cage, self.before)
@@ -352,140 +382,6 @@ class SaveKey(BoundObjectOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class Bake(BoundObjectOperator, bpy.types.Operator):
-    bl_idname = "cagework.bake"
-    bl_label = "Bake"
-    bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
-
-    form: bpy.props.EnumProperty(
-        name="Format",
-        items=[
-            ("KEYS", "Shape Keys", "A key per frame, with animated values"),
-            ("MDD", "MDD", "A file for the Mesh Cache modifier"),
-            ("PC2", "PC2", "A file for the Mesh Cache modifier"),
-        ],
-    )
-    first: bpy.props.IntProperty(name="First Frame", default=1)
-    last: bpy.props.IntProperty(name="Last Frame", default=250)
-    step: bpy.props.IntProperty(name="Step", default=1, min=1)
-    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", description="Without its extension")
-
-    def invoke(self, context, _event):
-        self.first, self.last = context.scene.frame_start, context.scene.frame_end
-        self.filepath = self.filepath or f"//{bound_mesh(context).name}"
-        return context.window_manager.invoke_props_dialog(self)
-
-    def execute(self, context):
-        scene, objects = context.scene, [o for o in meshes(context) if o.data.cagework.stamp]
-        if self.form == "KEYS":
-            objects = list({o.data: o for o in objects}.values())
-        frames, current = list(range(self.first, self.last + 1, self.step)), scene.frame_current
-        if not frames:
-            return self.refuse(f"There are no frames from {self.first} to {self.last}")
-        for obj in objects:
-            if fault := binding.problem(obj, scene):
-                return self.refuse(fault)
-        for obj in objects:
-            remove_bake(obj)
-        context.window_manager.progress_begin(0, len(frames))
-        try:
-            poses = [self.poses(context, objects, frame) for frame in frames]
-        except cw.Error as error:
-            return self.refuse(str(error))
-        finally:
-            context.window_manager.progress_end()
-            scene.frame_set(current)
-        for obj, own in zip(objects, zip(*poses)):
-            if self.form == "KEYS":
-                self.to_keys(obj, frames, own)
-                continue
-            name = self.filepath if len(objects) == 1 else f"{self.filepath} {bpy.path.clean_name(obj.name)}"
-            try:
-                self.to_file(obj, name, frames, own, scene.render.fps / scene.render.fps_base)
-            except OSError as error:
-                return self.refuse(f"The file was not written: {error}")
-        return {"FINISHED"}
-
-    def poses(self, context, objects, frame):
-        """For each object, shape and value of the key that follows the cage; for a file, the mix of all shape keys."""
-        context.scene.frame_set(frame)
-        context.window_manager.progress_update((frame - self.first) // self.step)
-        found = []
-        for obj in objects:
-            if fault := binding.follow(obj, context.evaluated_depsgraph_get()):
-                raise cw.Error(fault)
-            live = obj.data.shape_keys.key_blocks[binding.KEY]
-            found.append((binding.coordinates(live.points), live.value) if self.form == "KEYS" else binding.mixed(obj))
-        return found
-
-    def to_keys(self, obj, frames, poses):
-        live, names = obj.data.shape_keys.key_blocks[binding.KEY], []
-        for frame, (shape, strength) in zip(frames, poses):
-            key = copy_key(obj, f"Cage {frame}")
-            key.slider_min, key.slider_max = live.slider_min, live.slider_max
-            key.points.foreach_set("co", shape.astype(np.float32).ravel())
-            near = [(frame - self.step, 0.0), (frame, strength), (frame + self.step, 0.0)]
-            for at, value in near[(frame == frames[0]) : 3 - (frame == frames[-1])]:
-                key.value = value
-                key.keyframe_insert("value", frame=at)
-            names.append(key.name)
-            for point in next(c for c in curves(obj.data.shape_keys) if c.data_path == value_path(key)).keyframe_points:
-                point.interpolation = "LINEAR"
-        live.mute, obj.data.cagework.baked = True, "\n".join(names)
-
-    def to_file(self, obj, name, frames, shapes, fps):
-        path = f"{bpy.path.abspath(name)}.{self.form.lower()}"
-        with open(path, "wb") as file:
-            if self.form == "MDD":
-                file.write(struct.pack(">2i", len(shapes), len(shapes[0])))
-                file.write((np.array(frames) / fps).astype(">f4").tobytes())
-                file.writelines(shape.astype(">f4").tobytes() for shape in shapes)
-            else:
-                header = (b"POINTCACHE2\0", 1, len(shapes[0]), frames[0], self.step, len(shapes))
-                file.write(struct.pack("<12siiffi", *header))
-                file.writelines(shape.astype("<f4").tobytes() for shape in shapes)
-        cache = obj.modifiers.new(f"Cagework {self.form}", "MESH_CACHE")
-        cache.cache_format, cache.filepath, cache.frame_start = self.form, self.filepath_of(path), frames[0] / self.step
-        cache.frame_scale = 1 / self.step  # Blender subtracts `frame_start` from the scaled frame.
-        obj.modifiers.move(len(obj.modifiers) - 1, 0)
-
-    def filepath_of(self, path):
-        return bpy.path.relpath(path) if self.filepath.startswith("//") else path
-
-
-def curves(data):
-    """The F-curves of animated data."""
-    return [curve for group in curve_groups(data) for curve in group]
-
-
-def curve_groups(data):
-    """The collections of F-curves of animated data, in the actions of Blender 4 and 5."""
-    action = data.animation_data.action if data.animation_data else None
-    if action is None or hasattr(action, "fcurves"):
-        return [action.fcurves] if action else []
-    return [bag.fcurves for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-
-
-def value_path(key):
-    """Path from the shape keys to the value of one of them."""
-    return f'key_blocks["{bpy.utils.escape_identifier(key.name)}"].value'
-
-
-def remove_bake(obj):
-    """Removes what the last bake of a mesh made, so that the live shape key deforms it again."""
-    for form in ["MDD", "PC2"]:
-        if cache := obj.modifiers.get(f"Cagework {form}"):
-            obj.modifiers.remove(cache)
-    keys, names = obj.data.shape_keys, obj.data.cagework.baked
-    for key in [keys.key_blocks[name] for name in names.split("\n") if name in keys.key_blocks]:
-        for group in curve_groups(keys):
-            for curve in [c for c in group if c.data_path == value_path(key)]:
-                group.remove(curve)
-        obj.shape_key_remove(key)
-    if names:
-        keys.key_blocks[binding.KEY].mute, obj.data.cagework.baked = False, ""
-
-
 class Unbind(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.unbind"
     bl_label = "Unbind"
@@ -498,9 +394,9 @@ class Unbind(BoundObjectOperator, bpy.types.Operator):
                 obj.shape_key_remove(keys.key_blocks[binding.KEY])
             if obj.data.shape_keys and len(obj.data.shape_keys.key_blocks) == 1:
                 obj.shape_key_clear()
-            obj.data.driver_remove("cagework.pose")
+            binding.release(obj.data)
             obj.data.cagework.stamp, obj.data.cagework.weights, obj.data.cagework.report = "", b"", ""
         return {"FINISHED"}
 
 
-CLASSES = [MakeCage, Bind, Reset, Pull, SaveKey, Bake, Unbind]
+CLASSES = [MakeCage, Bind, Reset, Pull, SaveKey, Unbind]

@@ -1,8 +1,42 @@
 """The panel *Cagework* in the sidebar of the 3-D view."""
 
+import blf
 import bpy
 
-from . import binding, operators
+from . import animation, bake, binding, operators, rig
+
+# Width of borders and of an icon, and size of the text, in pixels at a resolution scale of 1.
+BORDERS, ICON, TEXT = 40, 20, 11
+# Operators for a bound mesh.
+ACTIONS = [
+    operators.Pull,
+    operators.Reset,
+    operators.SaveKey,
+    *bake.CLASSES,
+    *rig.CLASSES,
+    operators.Unbind,
+]
+
+
+def wrapped(text, width, size):
+    """Splits a text at spaces into lines up to a width, for a text size. Both in pixels."""
+    blf.size(0, size)
+    lines = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and blf.dimensions(0, longer)[0] <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
+def notice(layout, context, text, icon="NONE"):
+    """Shows a text in as many lines as the width of the region needs."""
+    scale = context.preferences.system.ui_scale
+    width = context.region.width - scale * (BORDERS + (ICON if icon != "NONE" else 0))
+    for k, line in enumerate(wrapped(text, width, TEXT * scale)):
+        layout.label(text=line, icon="BLANK1" if k and icon != "NONE" else icon)
 
 
 class Panel(bpy.types.Panel):
@@ -18,7 +52,9 @@ class Panel(bpy.types.Panel):
         obj = chosen[0]
         bound = obj.data.cagework
         layout.label(text=obj.name if len(chosen) == 1 else f"{obj.name} and {len(chosen) - 1} more", icon="MESH_DATA")
-        layout.operator("cagework.make_cage")
+        row = layout.row(align=True)
+        row.operator("cagework.make_cage").vertices = bound.vertices
+        row.prop(bound, "vertices")
         layout.prop(bound, "cage")
         layout.prop(bound, "grid")
         row = layout.row(align=True)
@@ -28,15 +64,14 @@ class Panel(bpy.types.Panel):
         row.operator("cagework.bind", text="Rebind").keep_rest = True
         box = layout.box()
         for line in bound.report.split("\n"):
-            box.label(text=line)
-        if fault := binding.problem(obj, context.scene):
-            wrapped = layout.box()
-            wrapped.alert = True
-            for k, line in enumerate(fault.split(": ", 1)):
-                wrapped.label(text=line, icon="NONE" if k else "ERROR")
+            notice(box, context, line)
+        if fault := binding.problem(obj, context.scene) or animation.warning(obj, context.scene):
+            box = layout.box()
+            box.alert = True
+            notice(box, context, fault, "ERROR")
         sharing = sum(o.data == obj.data for o in context.scene.objects) - 1
         if sharing:
-            layout.label(text=f"{sharing} linked duplicates take the same shape", icon="INFO")
+            notice(layout, context, f"{sharing} linked duplicates take the same shape", "INFO")
         column = layout.column(align=True)
-        for name in ["pull", "reset", "save_key", "bake", "unbind"]:
-            column.operator(f"cagework.{name}")
+        for each in ACTIONS:
+            column.operator(each.bl_idname)

@@ -37,7 +37,7 @@ mod native {
     #[pymodule_export]
     use crate::proportions::{humanoid_bones, proportions};
     #[pymodule_export]
-    use crate::pull::pull;
+    use crate::pull::{Drag, Puller, pull};
     #[pymodule_export]
     use crate::reshape::reshape;
     #[pymodule_export]

@@ -2,6 +2,7 @@ import json
 
 import cagework as cw
 import numpy as np
+import pytest
 import scipy.sparse
 from support import bent, box, command
 
@@ -80,6 +81,20 @@ def test_pull_equals_the_command(model, cage, tmp_path):
     assert np.array_equal(posed.astype(np.float32), cw.read_model(tmp_path / "posed.obj")[0])
     assert np.abs(weights @ posed - points)[bottom].max() < 0.01
     assert np.abs((weights @ posed)[top] - to).max() < 0.01
+
+
+def test_puller_returns_the_poses_of_pull_and_its_drag_reaches_changing_targets(model, cage):
+    weights, report = cw.bind(model.vertices, cage, grid=24)
+    given, options = (model.vertices, model.faces, cage, weights), {"report": report, "grid": 24}
+    puller, top = cw.Puller(*given, **options), int(model.vertices[:, 2].argmax())
+    goals = [model.vertices[[top]] + offset for offset in ([0.3, 0.0, 0.1], [-0.2, 0.1, 0.0])]
+    for goal in goals:
+        assert np.array_equal(puller.pull([top], goal), cw.pull(*given, [top], goal, **options))
+    drag = puller.drag([top], start=cage.vertices)
+    for goal in [*goals, model.vertices[[top]]]:
+        assert np.abs((weights @ drag.to(goal))[top] - goal).max() < 0.01
+    with pytest.raises(cw.ArrayError, match=r"shape \[1, 3\]"):
+        drag.to(model.vertices[:2])
 
 
 def test_bind_many_equals_bind_without_further_solves(model, cage):

@@ -1,4 +1,5 @@
-"""Prints the table of docs/blender.md: Cagework beside Blender's Mesh Deform, on the reference of tests/data/armadillo.
+"""Prints the tables of docs/blender.md: Cagework beside Blender's Mesh Deform, on the reference of tests/data/armadillo
+and, for the time of a frame and of a mouse move, on a sphere of 36,182 vertices.
 
 Run by hand, in the environment of `cargo xtask blender`: python compare.py [PRECISION ...]
 """
@@ -10,10 +11,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from conftest import EXTENSION, local, select, world
+from conftest import EXTENSION, Modal, ball, local, select, world
 
 DATA = Path(__file__).parents[4] / "tests/data/armadillo"
 RUNS = 3
+# Frames of the animation, and mouse moves of the drag.
+STEPS = 60
 
 
 def mesh_object(name, vertices, faces):
@@ -81,6 +84,52 @@ def with_cagework(grid):
     return bind
 
 
+def caged_sphere():
+    """A sphere of 36,182 vertices and its cage, in a new file."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    model = ball("Model", segments=270)
+    select(model)
+    bpy.ops.cagework.make_cage(vertices=80)
+    return model, model.data.cagework.cage
+
+
+def frame_time(bind):
+    """Median time of a frame in which the cage moves, ms."""
+    model, cage = caged_sphere()
+    bind(model, cage)
+    for frame, x in [(1, 0.0), (STEPS, 1.0)]:
+        cage.location.x, cage.scale.z = x, 1 + x
+        for path in ["location", "scale"]:
+            cage.keyframe_insert(path, frame=frame)
+    return median_time(bpy.context.scene.frame_set)
+
+
+def median_time(step):
+    """Median time of a function for the numbers 1 to STEPS, ms."""
+    times = []
+    for k in range(1, STEPS + 1):
+        start = time.perf_counter()
+        step(k)
+        times.append(1000 * (time.perf_counter() - start))
+    return np.median(times)
+
+
+def move_time():
+    """Median time of a mouse move while a point is pulled, ms; with the update of the mesh."""
+    model, cage = caged_sphere()
+    with_cagework(64)(model, cage)
+    modal = Modal(EXTENSION.operators.Pull)
+    modal.invoke()
+    middle = np.array([modal.region.width, modal.region.height]) / 2
+    modal.send("LEFTMOUSE", "PRESS", middle)
+
+    def step(k):
+        assert modal.send("MOUSEMOVE", at=middle + k) == {"RUNNING_MODAL"}
+        bpy.context.view_layer.update()
+
+    return median_time(step)
+
+
 if __name__ == "__main__":
     reference = np.load(DATA / "weights_fem.npy")
     print(EXTENSION.__name__, bpy.app.version_string)
@@ -89,4 +138,6 @@ if __name__ == "__main__":
         # Measure the extension first, because the peak memory of a process only grows.
         row("Cagework", cells, with_cagework(cells), reference)
         row("Mesh Deform", cells, with_mesh_deform(precision), reference)
+    mesh_deform, cagework = frame_time(with_mesh_deform(5)), frame_time(with_cagework(64))
+    print(f"a frame: Mesh Deform {mesh_deform:.1f} ms, Cagework {cagework:.1f} ms; a mouse move: {move_time():.1f} ms")
     EXTENSION.unregister()  # Otherwise Blender does not exit.

@@ -104,6 +104,15 @@ def attach(obj, matrix):
     return empty
 
 
+@pytest.fixture
+def gltf():
+    """Blender's glTF add-on, which calls the extension like an installed one."""
+    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    bpy.context.preferences.addons.new().module = EXTENSION.__name__
+    yield
+    bpy.context.preferences.addons.remove(bpy.context.preferences.addons[EXTENSION.__name__])
+
+
 class Modal:
     """Runs the methods of a modal operator on a plain object, because Blender sends no events in the background.
 

@@ -41,6 +41,50 @@ def test_made_cage_encloses_the_mesh_and_is_drawn_as_wire(body):
     assert not [problem for problem in found if problem["severity"] == "error"]
 
 
+def cages():
+    return [o for o in bpy.data.objects if o.display_type == "WIRE"]
+
+
+@pytest.mark.parametrize("active", ["mesh", "cage"])
+def test_second_made_cage_replaces_the_first_one(body, active):
+    cage = bind(body, vertices=40)
+    move(cage, bend(local(cage.data)))
+    posed, n_meshes = world(body), len(bpy.data.meshes)
+    bpy.ops.ed.undo_push(message="pose")
+    select(body if active == "mesh" else cage)
+    bpy.ops.cagework.make_cage(vertices=60)
+    cage = body.data.cagework.cage
+    assert cages() == [cage] and cage.name == "Body Cage" and len(cage.data.vertices) > 40
+    assert len(bpy.data.meshes) == n_meshes and bpy.context.active_object == body and body.data.cagework.vertices == 60
+    assert np.array_equal(world(body), posed) and "not bound to Body Cage yet" in binding.problem(body, bpy.context.scene)
+    bpy.ops.cagework.bind()
+    before = world(body)
+    cage.location.x += 1
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+    bpy.ops.ed.undo_push(message="bind")
+    bpy.ops.ed.undo()
+    body = bpy.data.objects["Body"]
+    assert len(body.data.cagework.cage.data.vertices) <= 40 and np.abs(world(body) - posed).max() < TOLERANCE
+    body.data.cagework.cage.location.x += 1
+    assert np.abs(world(body) - posed - [1, 0, 0]).max() < TOLERANCE
+
+
+def test_made_cage_replaces_no_cage_of_another_mesh_or_of_the_user(body):
+    shirt = ball("Shirt", segments=12)
+    shared = bind(body, shirt)
+    select(body)
+    bpy.ops.cagework.make_cage(vertices=40)
+    own = body.data.cagework.cage
+    assert set(cages()) == {shared, own} and shirt.data.cagework.cage == shared
+    bpy.ops.mesh.primitive_cube_add(size=3)
+    cube = bpy.context.active_object
+    body.data.cagework.cage = cube
+    select(body, shirt)
+    bpy.ops.cagework.make_cage(vertices=40)
+    both = body.data.cagework.cage
+    assert set(cages()) == {own, both} and shirt.data.cagework.cage == both and cube.name in bpy.data.objects
+
+
 PLACES = {
     "plain": Matrix(),
     "turned, scaled unevenly, far": Matrix.LocRotScale(Vector((5, -3, 2)), Euler((0.3, 1.0, -0.7)), Vector((2.0, 0.5, 1.5))),
@@ -234,7 +278,7 @@ def test_renders_show_the_pose_of_a_cage_that_is_hidden_in_renders(body, keyed, 
     target.keyframe_insert(path, frame=1)
     setattr(target, path, (1, 0, 0) if keyed == "location" else 1)
     target.keyframe_insert(path, frame=3)
-    for curve in EXTENSION.operators.curves(target.id_data):
+    for curve in EXTENSION.animation.curves(target.id_data):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
     material = bpy.data.materials.new("Glow")
@@ -412,10 +456,11 @@ def test_faults_are_sentences(body, tmp_path):
 def test_another_cage_is_used_only_after_a_bind(body):
     scene, first = bpy.context.scene, bind(body, vertices=40)
     before = world(body)
+    second = first.copy()
+    second.data = first.data.copy()
+    scene.collection.objects.link(second)
+    body.data.cagework.cage = second
     select(body)
-    bpy.ops.cagework.make_cage(vertices=40)
-    second = body.data.cagework.cage
-    assert len(second.data.vertices) == len(first.data.vertices) and second != first
     assert np.abs(world(body) - before).max() < TOLERANCE
     assert first.name in binding.problem(body, scene)
     with pytest.raises(RuntimeError, match="not bound to"):
@@ -573,6 +618,22 @@ def test_pulled_vertex_reaches_its_target():
     assert np.abs((world(body) - before)[top] - [0.2, 0.1, 0.3]).max() < 0.02
 
 
+def test_pull_is_prepared_once_per_bind_and_shape_of_the_mesh(body, monkeypatch):
+    bind(body)
+    prepared, Puller = [], cw.Puller
+    monkeypatch.setattr(cw, "Puller", lambda *given, **options: prepared.append(given[0]) or Puller(*given, **options))
+
+    def pull(offset):
+        assert bpy.ops.cagework.pull(vertex=3, offset=offset) == {"FINISHED"}
+        return len(prepared)
+
+    assert [pull((0.1, 0, 0)), pull((0, 0.1, 0))] == [1, 1]
+    body.data.shape_keys.reference_key.points.foreach_set("co", (1.1 * binding.basis(body.data)).astype(np.float32).ravel())
+    assert pull((0.1, 0, 0)) == 2 and np.array_equal(prepared[1], binding.basis(body.data))
+    bpy.ops.cagework.bind()
+    assert pull((0.1, 0, 0)) == 3
+
+
 def test_bind_in_a_window_reports_progress_and_stores_the_weights_at_the_end(body):
     cage = bind(body)
     points, rest = world(body), local(cage.data)
@@ -661,7 +722,7 @@ def test_pull_refuses_a_cage_that_mixes_shape_keys_and_restores_it_after_a_fault
     modal.send("LEFTMOUSE", "PRESS", (modal.region.width / 2, modal.region.height / 2))
     modal.send("MOUSEMOVE", at=(modal.region.width / 2 + 30, modal.region.height / 2))
     assert not np.array_equal(binding.coordinates(wide.points), before)
-    modal.operator.posed = modal.operator.posed * np.nan
+    modal.operator.to_world = modal.operator.to_world * np.nan
     assert modal.send("MOUSEMOVE", at=(0, 0)) == {"CANCELLED"} and modal.reports[0][0] == {"ERROR"}
     assert np.array_equal(binding.coordinates(wide.points), before)
 

@@ -16,7 +16,9 @@ from typing import Any
 from cagework._errors import ArrayError, BindError, CageError, Error, ModelError, OptionError, PullError
 from cagework._native import (
     Cage,
+    Drag,
     Field,
+    Puller,
     Splats,
     __version__,
     bind,
@@ -37,11 +39,13 @@ __all__ = [
     "BindError",
     "Cage",
     "CageError",
+    "Drag",
     "Error",
     "Field",
     "ModelError",
     "OptionError",
     "PullError",
+    "Puller",
     "Splats",
     "__version__",
     "bind",

@@ -115,6 +115,43 @@ class Field:
     def save(self, path: str | PathLike[str] | _Writable) -> None: ...
 
 @final
+class Puller:
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        cage: Cage,
+        weights: Any,
+        *,
+        report: dict[str, Any] | None = None,
+        progress: _Progress = None,
+        **options: Unpack[BindOptions],
+    ) -> Puller: ...
+    def pull(
+        self,
+        grabs: ArrayLike,
+        to: ArrayLike,
+        *,
+        pins: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        reach: float | None = None,
+        relax: float = 0.5,
+    ) -> NDArray[np.float64]: ...
+    def drag(
+        self,
+        grabs: ArrayLike,
+        *,
+        pins: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        reach: float | None = None,
+        relax: float = 0.5,
+    ) -> Drag: ...
+
+@final
+class Drag:
+    def to(self, targets: ArrayLike) -> NDArray[np.float64]: ...
+
+@final
 class Splats:
     def __new__(cls, path: _Model) -> Splats: ...
     def __len__(self) -> int: ...
