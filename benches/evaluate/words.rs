@@ -144,14 +144,15 @@ fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     if let (Some(third), Some(fourth)) = (rate(last / 2, 3 * last / 4), rate(3 * last / 4, last)) {
         let bend = third.ln() / fourth.ln();
         let straight = if bend < MAX_DECAY_RATIO && bend > 1.0 / MAX_DECAY_RATIO {
-            "a geometric decay, which is a straight line over the number of sweeps"
+            "a geometric decay. Over the number of sweeps, this is a straight line if the axis of delta is logarithmic; in figure 7, \
+             the axis of time is logarithmic too"
         } else {
-            "so the decay is not geometric"
+            "so the decay is not geometric (figure 7)"
         };
         let _ = writeln!(
             out,
             "- \"Delta appears to decrease logarithmically\": it falls by the factor {third:.4} per sweep in the third \
-             quarter of the solve and by {fourth:.4} in the last quarter, {straight} (figure 7).",
+             quarter of the solve and by {fourth:.4} in the last quarter, {straight}.",
         );
     }
 }

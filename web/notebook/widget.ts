@@ -4,7 +4,7 @@
  */
 
 import type { BindReport, Offsets } from "../package/src/contract/generated";
-import { CageDeformer } from "../package/src/element";
+import { CageDeformerElement } from "../package/src/element";
 import { compile } from "./open";
 
 /** The model, cage and weights that Python sends. Positions are in object units. */
@@ -61,7 +61,7 @@ function isDark(): boolean {
 }
 
 // The package declares side effects only for its built files, so a bundler would drop the definition in element.ts.
-if (!customElements.get("cage-deformer")) customElements.define("cage-deformer", CageDeformer);
+if (!customElements.get("cage-deformer")) customElements.define("cage-deformer", CageDeformerElement);
 
 function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
   compile(bytes(model.get("_wasm")));

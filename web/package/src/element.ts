@@ -39,7 +39,7 @@ export interface Source extends NameOption {
 // Servers have no HTMLElement. They can import this module, but it defines no element there.
 const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 
-export class CageDeformer extends Base {
+export class CageDeformerElement extends Base {
   static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
 
   #view: Promise<View> | undefined;
@@ -276,11 +276,11 @@ function nameIn(address: URL): string | undefined {
 }
 
 if (globalThis.customElements && !customElements.get("cage-deformer")) {
-  customElements.define("cage-deformer", CageDeformer);
+  customElements.define("cage-deformer", CageDeformerElement);
 }
 
 declare global {
   interface HTMLElementTagNameMap {
-    "cage-deformer": CageDeformer;
+    "cage-deformer": CageDeformerElement;
   }
 }

@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { type Browser, test as base, chromium, expect, type Page } from "@playwright/test";
 import { WEBGL_LAUNCH, WEBGPU_LAUNCH } from "../../e2e/browser";
-import type { CageDeformer } from "../src/element";
+import type { CageDeformerElement } from "../src/element";
 import type { BindResult } from "../src/types";
 
 /** Folder of the screenshots that the tests save for visual inspection. */
@@ -304,14 +304,14 @@ test("an element opens compressed files, reports unreadable ones and frees its m
   await page.waitForFunction(() => "freed" in globalThis);
   // An element that is connected again opens its model.
   await page.evaluate(() => {
-    const { element } = globalThis as unknown as { element: CageDeformer };
+    const { element } = globalThis as unknown as { element: CageDeformerElement };
     element.src = "model.glb";
     document.body.append(element);
   });
   await ready(page);
   // An element that is moved within the page keeps its model and pose.
   const [pose, kept] = await page.evaluate(async () => {
-    const { element } = globalThis as unknown as { element: CageDeformer };
+    const { element } = globalThis as unknown as { element: CageDeformerElement };
     element.pose = element.pose?.map((x) => x + 1) ?? null;
     const { pose } = element;
     document.body.prepend(element);
@@ -321,14 +321,14 @@ test("an element opens compressed files, reports unreadable ones and frees its m
   expect(kept).toBe(pose);
   // An element without src shows nothing. An element that is removed while it opens a model frees memory and worker.
   await page.evaluate(() => {
-    const { element } = globalThis as unknown as { element: CageDeformer };
+    const { element } = globalThis as unknown as { element: CageDeformerElement };
     element.src = null;
   });
   await expect.poll(() => page.workers().length).toBe(0);
   expect(await page.evaluate(() => document.querySelector("cage-deformer")?.pose)).toBeNull();
   for (const ms of [0, 100, 300]) {
     await page.evaluate(async (ms) => {
-      const { element } = globalThis as unknown as { element: CageDeformer };
+      const { element } = globalThis as unknown as { element: CageDeformerElement };
       Object.assign(globalThis, { freed: false });
       element.src = "model.glb";
       document.body.append(element);

@@ -29,12 +29,10 @@ export interface OpenResult {
  */
 export async function openOn<T>(canvases: Canvases, start: (opened: OpenResult) => Promise<T>): Promise<T> {
   try {
-    const adapter = findAdapter();
-    // Compile while the adapter is requested, unless the browser has no WebGPU.
-    const module = navigator.gpu ? compile(WEBGPU.wasm) : adapter.then(() => compile(WEBGPU.wasm));
-    const [found, compiled] = await Promise.all([adapter, module]);
-    const canvas = canvases.canvas();
-    return await start({ artifact: WEBGPU, module: compiled, canvas, adapter: found, lack: null });
+    // Without an adapter, the other build is needed instead: do not download both.
+    const adapter = await findAdapter();
+    const module = await compile(WEBGPU.wasm);
+    return await start({ artifact: WEBGPU, module, canvas: canvases.canvas(), adapter, lack: null });
   } catch (error) {
     const lack = lackOf(error);
     if (!lack || !hasWebGl2()) throw error;
