@@ -148,8 +148,9 @@ def dressed(name, body, folder, garments):
     write_obj(WORK / f"{name}.obj", parts)
 
 
-def draw(model, *options, size="440x720", view="20,8"):
-    run("render", model, "-o", "picture.png", "--no-cage", "--theme", "light", "--size", size, "--view", view, *options)
+def draw(model, *options, cage=None, size="440x720", view="20,8"):
+    options += ("--cage", cage) if cage else ("--no-cage",)
+    run("render", model, "-o", "picture.png", "--theme", "light", "--size", size, "--view", view, *options)
     return Image.open(WORK / "picture.png").convert("RGB")
 
 
