@@ -26,6 +26,45 @@ export interface Geometry {
   computeBoundingBox(): void;
 }
 
+/** Members of three.js's `Vector3` that are used here. */
+interface Vector {
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+  clone(): Vector;
+  set(x: number, y: number, z: number): Vector;
+  add(other: Vector): Vector;
+  sub(other: Vector): Vector;
+  copy(other: Vector): Vector;
+  applyMatrix4(matrix: Matrix): Vector;
+  setFromMatrixPosition(matrix: Matrix): Vector;
+}
+
+/** Members of three.js's `Matrix4` that are used here. */
+interface Matrix {
+  clone(): Matrix;
+  copy(other: Matrix): Matrix;
+  invert(): Matrix;
+  multiply(other: Matrix): Matrix;
+  setPosition(x: Vector | number, y?: number, z?: number): Matrix;
+}
+
+/** Members of three.js's `Bone` that are used here. */
+interface Joint {
+  readonly parent: unknown;
+  readonly position: unknown;
+  readonly matrix: unknown;
+  updateMatrix(): void;
+}
+
+/** Members of three.js's `SkinnedMesh` that are used here. */
+export interface Skinned {
+  readonly geometry: Geometry;
+  readonly bindMatrix: unknown;
+  readonly bindMatrixInverse: unknown;
+  readonly skeleton: { readonly bones: readonly Joint[]; readonly boneInverses: readonly unknown[] };
+}
+
 /**
  * `cage`: the cage to bind to. `cageOptions`: options of `generateCage`, which makes a cage if there is no `cage`. All
  * other options are those of `bind`.
@@ -47,9 +86,28 @@ interface Part {
   readonly group: Uint32Array;
 }
 
+/** A joint of a skinned mesh at rest. Linear parts are matrices without translation. */
+interface RestJoint {
+  readonly position: Vector;
+  /** Index of the parent among the joints; -1 for none. */
+  readonly parent: number;
+  readonly inverse: Matrix;
+  /** From the joint to the space in which the skeleton was bound, at rest. */
+  readonly world: Matrix;
+  readonly origin: Vector;
+  /** Linear part from the geometry to the space in which the skeleton was bound. */
+  readonly toWorld: Matrix;
+  /** Linear part from the space in which the skeleton was bound to the parent of the joint. */
+  readonly toParent: Matrix;
+  /** Displacement that was added to `position`. */
+  readonly added: Vector;
+}
+
 /**
  * Moves the vertices of geometries with a cage. The geometries and the cage must have the same coordinate system, such
- * as the local space of one mesh.
+ * as the local space of one mesh. The joints of a `SkinnedMesh` follow, as with `joints: "follow"` of `reshape`: they keep
+ * their directions, and the skin stays as it is at rest. The skeleton must be at rest when the deformer is created.
+ * Animations that set the position of a joint, not only its rotation, put it back.
  *
  *     const deformer = await CageDeformer.create(mesh.geometry, { grid: 64 });
  *     deformer.pose[1] += 0.5;
@@ -66,6 +124,7 @@ export class CageDeformer {
   readonly weights: Weights;
   readonly #parts: readonly Part[];
   readonly #triangles: Uint32Array;
+  readonly #joints: readonly RestJoint[];
   #updating: Promise<void> | undefined;
   #isOutdated = false;
 
@@ -75,6 +134,7 @@ export class CageDeformer {
     report: BindReport,
     parts: Part[],
     triangles: Uint32Array,
+    joints: readonly RestJoint[],
   ) {
     this.cage = cage;
     this.pose = Float32Array.from(cage.positions);
@@ -83,18 +143,23 @@ export class CageDeformer {
     this.weights = weights;
     this.#parts = parts;
     this.#triangles = triangles;
+    this.#joints = joints;
   }
 
-  /** Binds geometries to the given cage. If there is none, generates a cage around the geometries first. */
+  /** Binds geometries or skinned meshes to the given cage. If there is none, generates a cage around them first. */
   static async create(
-    geometries: Geometry | readonly Geometry[],
+    models: Geometry | Skinned | readonly (Geometry | Skinned)[],
     { cage, cageOptions = {}, ...options }: DeformerOptions = {},
   ): Promise<CageDeformer> {
-    const { parts, positions, triangles } = joined("length" in geometries ? geometries : [geometries]);
+    const all = "length" in models ? models : [models];
+    const geometries = all.map((model) => ("skeleton" in model ? model.geometry : model));
+    const { parts, positions, triangles } = joined(geometries);
+    const joints = jointsOf(all.filter((model) => "skeleton" in model));
     const { signal } = options;
     const around = cage ?? (await generateCage({ positions, triangles }, { signal, ...cageOptions }));
-    const { weights, report } = await bind(positions, around, options);
-    return new CageDeformer(around, weights, report, parts, triangles);
+    const points = [...positions, ...joints.flatMap(({ origin: { x, y, z } }) => [x, y, z])];
+    const { weights, report } = await bind(Float32Array.from(points), around, options);
+    return new CageDeformer(around, weights, report, parts, triangles, joints);
   }
 
   /**
@@ -122,7 +187,57 @@ export class CageDeformer {
         geometry.computeBoundingSphere();
         geometry.computeBoundingBox();
       }
+      moveJoints(this.#joints, points.subarray(points.length - 3 * this.#joints.length));
     }
+  }
+}
+
+/** Collects the joints of skinned meshes at rest. A skeleton that several meshes share counts once. */
+function jointsOf(meshes: readonly Skinned[]): RestJoint[] {
+  const joints: RestJoint[] = [];
+  const seen = new Set<Skinned["skeleton"]>();
+  for (const { skeleton, bindMatrix, bindMatrixInverse } of meshes) {
+    if (seen.has(skeleton)) continue;
+    seen.add(skeleton);
+    const [first, { bones, boneInverses }] = [joints.length, skeleton];
+    const linear = (matrix: Matrix) => matrix.clone().setPosition(0, 0, 0);
+    for (const [k, bone] of bones.entries()) {
+      const [inverse, position] = [boneInverses[k] as Matrix, bone.position as Vector];
+      const world = inverse.clone().invert();
+      const parent = bones.indexOf(bone.parent as Joint);
+      bone.updateMatrix();
+      const toParent =
+        parent >= 0 ? (boneInverses[parent] as Matrix) : (bone.matrix as Matrix).clone().multiply(inverse);
+      joints.push({
+        position,
+        parent: parent < 0 ? -1 : first + parent,
+        inverse,
+        world,
+        origin: position.clone().setFromMatrixPosition((bindMatrixInverse as Matrix).clone().multiply(world)),
+        toWorld: linear(bindMatrix as Matrix),
+        toParent: linear(toParent),
+        added: position.clone().set(0, 0, 0),
+      });
+    }
+  }
+  return joints;
+}
+
+/** Moves joints to `points`, in the space of the geometry, and changes their inverse bind matrices accordingly. */
+function moveJoints(joints: readonly RestJoint[], points: Float32Array): void {
+  const by = joints.map(({ origin, toWorld }, k) => {
+    const [x = 0, y = 0, z = 0] = points.subarray(3 * k);
+    return origin.clone().set(x, y, z).sub(origin).applyMatrix4(toWorld);
+  });
+  for (const [k, { position, parent, inverse, world, toParent, added }] of joints.entries()) {
+    const own = by[k]?.clone();
+    const of = by[parent];
+    if (!own) continue;
+    const moved = own.clone().setFromMatrixPosition(world).add(own);
+    inverse.copy(world).setPosition(moved).invert();
+    const local = (of ? own.sub(of) : own).applyMatrix4(toParent);
+    position.sub(added).add(local);
+    added.copy(local);
   }
 }
 

@@ -11,12 +11,18 @@ import { inflateRawSync } from "node:zlib";
 import { bind, deform, field, generateCage, proportions, readModel, reshape } from "@cagework/core";
 import { CageDeformer } from "@cagework/core/three";
 import {
+  Bone,
   BufferAttribute,
   BufferGeometry,
+  CylinderGeometry,
+  Group,
   InterleavedBuffer,
   InterleavedBufferAttribute,
   Matrix4,
+  Skeleton,
+  SkinnedMesh,
   SphereGeometry,
+  Vector3,
 } from "three";
 import { sample } from "./sample.mjs";
 
@@ -422,6 +428,54 @@ for (const [type, isNormalized, centre, scale] of [
     });
   }
 }
+
+test("joints of a skinned mesh follow the cage, and its skin stays at rest", async () => {
+  const geometry = new CylinderGeometry(0.4, 0.4, 4, 12, 8).translate(0, 2, 0);
+  const { position } = geometry.attributes;
+  const rest = position.clone();
+  // The upper half follows the second bone.
+  const index = Array.from({ length: position.count }, (_, v) => [position.getY(v) > 2.1 ? 1 : 0, 0, 0, 0]);
+  geometry.setAttribute("skinIndex", new BufferAttribute(Uint16Array.from(index.flat()), 4));
+  const weight = index.flatMap(() => [1, 0, 0, 0]);
+  geometry.setAttribute("skinWeight", new BufferAttribute(Float32Array.from(weight), 4));
+  const [root, tip, mesh] = [new Bone(), new Bone(), new SkinnedMesh(geometry)];
+  root.position.set(0, 0.5, 0);
+  root.rotation.z = 0.3;
+  tip.position.set(0, 1.5, 0);
+  const armature = new Group().add(root.add(tip), mesh);
+  armature.rotation.x = 0.4;
+  armature.updateMatrixWorld(true);
+  mesh.bind(new Skeleton([root, tip]));
+  const joint = (bone) => mesh.worldToLocal(bone.getWorldPosition(new Vector3()));
+  const before = [root, tip].map(joint);
+  const deformer = await CageDeformer.create(mesh, { grid: 24, cageOptions: { target: 40 } });
+  // Affine maps are reproduced exactly.
+  const posed = ([x, y, z]) => [1.2 * x, 1.5 * y - 0.2, z + 0.1 * y];
+  for (let k = 0; k < deformer.pose.length; k += 3)
+    deformer.pose.set(posed(deformer.cage.positions.subarray(k, k + 3)), k);
+  for (let repeated = 0; repeated < 2; repeated++) {
+    await deformer.update();
+    armature.updateMatrixWorld(true);
+    mesh.skeleton.update();
+    for (const [k, bone] of [root, tip].entries()) {
+      const off = joint(bone).distanceTo(new Vector3(...posed(before[k].toArray())));
+      assert.ok(off < 1e-5, `joint ${k}: ${off}`);
+    }
+    for (let v = 0; v < position.count; v++) {
+      const skinned = mesh.getVertexPosition(v, new Vector3());
+      const off = skinned.distanceTo(new Vector3(...posed([rest.getX(v), rest.getY(v), rest.getZ(v)])));
+      assert.ok(off < 1e-5, `vertex ${v}: ${off}`);
+    }
+  }
+  // A rotation of the second bone turns the upper half about the moved joint.
+  const [pivot, v] = [tip.getWorldPosition(new Vector3()), index.findIndex(([bone]) => bone === 1)];
+  const at = () => mesh.localToWorld(mesh.getVertexPosition(v, new Vector3()));
+  const distance = at().distanceTo(pivot);
+  const start = at();
+  tip.rotation.x = 1;
+  armature.updateMatrixWorld(true);
+  assert.ok(Math.abs(at().distanceTo(pivot) - distance) < 1e-5 && at().distanceTo(start) > 0.3);
+});
 
 function facesOf({ corners }) {
   let faces = 0;
