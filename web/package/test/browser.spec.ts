@@ -1,7 +1,8 @@
 /** Tests the installed package in Chromium: a three.js page and the element, both unbundled and bundled. */
 
-import { readFileSync } from "node:fs";
+import { readFileSync, statSync } from "node:fs";
 import { join } from "node:path";
+import { gzipSync } from "node:zlib";
 import { type Browser, test as base, chromium, expect, type Page } from "@playwright/test";
 import { WEBGL_LAUNCH, WEBGPU_LAUNCH } from "../../e2e/browser";
 import type { CageDeformerElement } from "../src/element";
@@ -180,6 +181,26 @@ test("the StackBlitz example moves a geometry with its cage", async ({ visit }) 
   const errors = shift.map((x, k) => Math.abs(x - (k % 3 === 1 ? 0.5 : 0)));
   expect(Math.max(...errors)).toBeLessThan(4 * ROUNDING);
   await page.screenshot({ path: join(SCREENS, "npm-stackblitz.png") });
+});
+
+test("the documents give the sizes of the package's files", () => {
+  const project = process.env.NPM_PROJECT ?? "";
+  const installed = join(project, "node_modules/@cagework/core");
+  const { version } = JSON.parse(readFileSync(join(installed, "package.json"), "utf8"));
+  const megabytes = (bytes: number) => `${(bytes / 1e6).toFixed(1)} MB`;
+  const packed = (file: string) => megabytes(gzipSync(readFileSync(join(installed, "dist", file))).length);
+  const [webgpu, webgl] = [packed("pkg/cagework_bg.wasm"), packed("pkg-webgl/cagework_webgl_bg.wasm")];
+  const archive = megabytes(statSync(join(project, `../cagework-core-${version}.tgz`)).size);
+  const lines = readFileSync(join(installed, "examples/three.html"), "utf8").trimEnd().split("\n").length;
+  const text = (path: string) => readFileSync(join(import.meta.dirname, "../../..", path), "utf8");
+  const guide = text("docs/npm.md");
+  expect(guide).toContain(
+    `A visitor downloads ${webgpu} (gzip) for the functions or the element, ${webgl} for the element without WebGPU, ` +
+      `and ${packed("fbx.js")} more for the first FBX file. The npm archive is ${archive} large.`,
+  );
+  expect(guide).toContain(`shows in ${lines} lines`);
+  expect(text("web/package/README.md")).toContain(`a three.js page in ${lines} lines`);
+  expect(text("README.md")).toMatch(new RegExp(`\\| ${webgpu} \\|\n.*\\| ${webgl} \\|`));
 });
 
 /** Waits until the element has bound its model. If the element shows an error instead, fails with its message. */
