@@ -16,6 +16,7 @@ pub struct Weights {
 
 /// Reason why arrays do not form a CSR matrix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum WeightsError {
     /// `indptr` is empty, does not start at 0, or is not ascending.
     #[error("row pointers are not ascending from 0 (at row {row})")]

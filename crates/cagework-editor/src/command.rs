@@ -472,14 +472,13 @@ impl Editor {
         let times: Vec<f32> = timed.iter().map(|(at, _)| *at).collect();
         check_times(&times).map_err(|error| {
             let name = |pose: usize| document.poses[pose].name.to_string();
-            let limit = match error {
-                TimelineError::OutOfRange { .. } => format!("times are from 0 to {MAX_SECONDS} s"),
-                TimelineError::Order { number, .. } => {
-                    // One of two poses that are too close is this one.
-                    let (before, after) = (timed[number - 2], timed[number - 1]);
-                    let (at, pose) = if before.1 == index { after } else { before };
-                    format!("{} is at {at} s, and poses are at least {MIN_GAP} s apart", name(pose))
-                }
+            let limit = if let TimelineError::Order { number, .. } = error {
+                // One of two poses that are too close is this one.
+                let (before, after) = (timed[number - 2], timed[number - 1]);
+                let (at, pose) = if before.1 == index { after } else { before };
+                format!("{} is at {at} s, and poses are at least {MIN_GAP} s apart", name(pose))
+            } else {
+                format!("times are from 0 to {MAX_SECONDS} s")
             };
             EditError::PoseTime { name: name(index), seconds, limit }
         })?;

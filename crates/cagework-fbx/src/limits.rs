@@ -11,6 +11,7 @@ const MAX_MEMORY: u64 = isize::MAX as u64 / 2;
 
 /// Error of converting an FBX file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FbxError {
     /// The file is damaged or too old.
     #[error("not readable as FBX: {0}. Export it again, as FBX 7.4 or newer")]

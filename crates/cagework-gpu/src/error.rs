@@ -8,6 +8,7 @@ use crate::plan::PlanError;
 
 /// Error of an operation on the GPU.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum GpuError {
     /// There is no usable GPU.
     #[error(

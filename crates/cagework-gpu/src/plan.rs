@@ -30,6 +30,7 @@ pub struct Plan {
 
 /// Reason why a bind does not fit into the GPU's memory.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// An array exceeds the binding limit.
     #[error(

@@ -7,6 +7,7 @@ use crate::shown::shown;
 
 /// Error of writing a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The number of positions differs from the model's number of vertices.
     #[error("{} for a model of {}: give one position per vertex", counted(*given, "position", "positions"), counted(*expected, "vertex", "vertices"))]
@@ -110,6 +111,7 @@ pub enum WriteError {
 
 /// Error of reading a model as a pose of a cage.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum PoseError {
     /// The pose and the cage have different numbers of vertices.
     #[error(

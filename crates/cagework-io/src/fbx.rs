@@ -11,6 +11,7 @@ use crate::memory::MemoryError;
 
 /// Error of reading an FBX file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FbxError {
     /// The file cannot be converted, for the reason given.
     #[error("{0}")]

@@ -34,6 +34,7 @@ use read::Source;
 
 /// Error of reading a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The format is not supported.
     #[error(transparent)]

@@ -34,6 +34,7 @@ use arrays::{Archive, NpyArray, NpzWriter, array, npy_header, required};
 
 /// Error of reading a weights file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum NpzError {
     /// Not a zip archive, or a damaged one.
     #[error("not an .npz file, or damaged: export it again")]

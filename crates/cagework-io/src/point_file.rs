@@ -17,6 +17,7 @@ const MEMORY_PER_POINT: u64 = 300;
 
 /// Error of reading a file of points.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PointFileError {
     /// The file is not UTF-8.
     #[error("not a text file: its bytes are not UTF-8")]

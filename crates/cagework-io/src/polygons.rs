@@ -17,6 +17,7 @@ use crate::origin::{origin_near, relative};
 
 /// Error of reading a PLY, STL, OFF or 3MF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum PolygonsError {
     /// The file does not follow the syntax of its format.
     #[error("the file is damaged: {0}")]

@@ -11,6 +11,7 @@ const VERTEX_BYTES: usize = 6;
 
 /// Error of decoding a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum PoseCodeError {
     /// The length is wrong.
     #[error("the pose is cut off or damaged: it has {given} bytes instead of {expected}")]

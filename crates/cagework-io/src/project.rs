@@ -39,6 +39,7 @@ pub struct Project {
 
 /// Why a project cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum ProjectError {
     /// The model in the project cannot be read.
     #[error(transparent)]

@@ -14,6 +14,7 @@ const MAX_LISTED_NAMES: usize = 20;
 
 /// Error of selecting a part by name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum SelectError {
     /// No part has this name.
     #[error("no part is called '{}'; the model has {}", name(asked), listed(names))]

@@ -38,6 +38,7 @@ const FILTER: &str = "remove such splats with `splat-transform IN.ply --filter-n
 
 /// Error of reading splats.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum SplatError {
     /// The file cannot be parsed.
     #[error("the file is damaged: {0}")]

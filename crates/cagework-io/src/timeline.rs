@@ -49,6 +49,7 @@ pub(crate) fn hermite(u: f64, gap: f64) -> [f64; 4] {
 
 /// Error in the times of poses: a time is out of range, or the times do not ascend.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TimelineError {
     /// A time is not a number of seconds within the limits.
     #[error("the time of pose {number} is {seconds} s: times are from 0 to {MAX_SECONDS} s")]

@@ -21,6 +21,7 @@ const MIN_SHARE: f32 = 1e-3;
 
 /// Error of [`Model::transfer_from`].
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum TransferError {
     /// The body has neither joint weights nor morph targets.
     #[error("{} has no skin and no morph targets: take a body with a skeleton or morph targets (.glb, .gltf or .vrm)", shown(.0))]

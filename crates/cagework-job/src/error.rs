@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Reason why a model file cannot be deformed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum JobError {
     /// An option has no effect on splats and points.
     #[error(

@@ -47,14 +47,6 @@ pub(crate) fn job(error: JobError) -> PyErr {
         | JobError::NoAnimation { .. }
         | JobError::Times { .. }
         | JobError::Timeline(_) => option(error),
-        JobError::NoClips
-        | JobError::NoSkeleton
-        | JobError::OtherCage { .. }
-        | JobError::RigPoints { .. }
-        | JobError::Unbound
-        | JobError::Select(_)
-        | JobError::Memory { .. }
-        | JobError::Read(_)
-        | JobError::Write(_) => model(error),
+        _ => model(error),
     }
 }

@@ -29,6 +29,7 @@ pub use repair::{Repair, RepairError, RepairedMesh, repair, repair_smooth};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+#[non_exhaustive]
 pub enum Code {
     /// The mesh has no faces or no vertices.
     Empty,

@@ -69,6 +69,7 @@ pub struct RepairedMesh {
 
 /// Why a repair failed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RepairError {
     /// [`Repair::Grow`] was requested without a model to enclose.
     #[error("growing the cage needs a model: give the one that should be inside")]

@@ -293,6 +293,7 @@ pub struct CageReport {
 
 /// Why no cage was generated.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CageGenError {
     /// An option is out of range.
     #[error(transparent)]

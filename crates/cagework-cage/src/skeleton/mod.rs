@@ -62,6 +62,7 @@ pub struct Skeleton {
 
 /// Why a model has no skeleton.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SkeletonError {
     /// The model has no triangles.
     #[error("the model has no faces, so it has no limbs: use another kind of cage")]

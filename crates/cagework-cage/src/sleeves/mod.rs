@@ -104,6 +104,7 @@ pub struct Sleeves {
 
 /// Why a skeleton gives no sleeve cage.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The skeleton does not fit the model, or has no usable trunk.
     #[error("the skeleton has {what}: sleeves need {limit}")]
@@ -180,6 +181,7 @@ pub enum Refusal {
 
 /// Why [`generate`] returns no cage.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SleeveError {
     /// The figure has no sleeve cage.
     #[error(transparent)]

@@ -48,6 +48,7 @@ pub struct Binding {
 
 /// Why a bind failed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum BindError {
     /// An option is out of range.
     #[error(transparent)]

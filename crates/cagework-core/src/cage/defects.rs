@@ -13,6 +13,7 @@ pub(super) const MAX_CORNERS: usize = 1000;
 
 /// Why a polygon mesh is not a cage. Indices start at 0.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CageError {
     /// There are no vertices or no faces.
     #[error("cage has no faces")]
@@ -137,6 +138,7 @@ pub enum CageError {
 
 /// Why a face is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FaceDefect {
     /// A vertex occurs more than once.
     #[error("vertex {vertex} is a corner of it more than once")]
@@ -160,6 +162,7 @@ pub enum FaceDefect {
 
 /// A repair of a cage, or an unusual property of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CageNotice {
     /// Vertices at equal positions along open edges were joined.
     Welded {

@@ -70,6 +70,7 @@ pub struct InnerControls {
 
 /// Why controls cannot be used. Indices start at 0.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ControlError {
     /// The number of subdivision steps is out of range.
     #[error(transparent)]

@@ -27,6 +27,7 @@ impl ClosedForm {
 
 /// Why closed-form coordinates cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum ClosedFormError {
     /// Harmonic coordinates have no closed form: they need a bind.
     #[error("{kind} coordinates have no closed form: use bind instead")]

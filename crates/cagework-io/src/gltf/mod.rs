@@ -82,6 +82,7 @@ fn size_of_total(found: u64, declared: u64) -> String {
 
 /// Error of reading a glTF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum GltfError {
     /// The GLB container is damaged.
     #[error("not a readable GLB: {}", shown(.0))]

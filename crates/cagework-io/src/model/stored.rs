@@ -26,6 +26,7 @@ use crate::up::UpAxis;
 
 /// Why a stored model cannot be restored.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RestoreError {
     /// An array is missing, or was not written by [`Model::store`].
     #[error("the model that was read is damaged: open the file again")]

@@ -6,6 +6,7 @@ use crate::memory::MemoryError;
 
 /// Error of reading an OBJ file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum ObjError {
     /// A coordinate is missing or not a finite number.
     #[error("line {line}: {axis} coordinate is {found}; it must be a finite number such as 1.25")]

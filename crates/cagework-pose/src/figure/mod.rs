@@ -50,6 +50,7 @@ pub struct NamedJoints {
 
 /// Why named joints are not those of a figure.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FigureError {
     /// There is no such bone.
     #[error("there is no bone {0:?}: bones are named as in VRM 1.0, such as leftUpperArm")]

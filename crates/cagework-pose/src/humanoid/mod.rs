@@ -130,6 +130,7 @@ pub struct BoneJoint {
 
 /// Why a rig has no humanoid bones.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum HumanoidError {
     /// The model has no joints.
     #[error("the model has no skeleton: pull its cage instead")]

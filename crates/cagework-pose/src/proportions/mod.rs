@@ -121,6 +121,7 @@ impl Default for Proportions {
 
 /// Error: a proportion cannot be set.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ProportionError {
     /// No proportion has the name.
     #[error("there is no proportion {name:?}; there are {known}")]

@@ -51,6 +51,7 @@ pub const MAX_CONTROLS: usize = 1000;
 
 /// Why a pull or a fit failed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PullError {
     /// The model has no vertices.
     #[error("the model has no vertices to grab")]
