@@ -235,8 +235,8 @@ test("pictures of the documents", async ({ page }) => {
     const data = await page.evaluate(async () => {
       const session = globalThis.cagework;
       if (!session) throw new Error("no session");
-      const view = document.querySelector("canvas");
-      session.engine.zoomAt((view?.clientWidth ?? 0) / 2, (view?.clientHeight ?? 0) / 2, 1.35);
+      // An option of a stop keeps the view of the picture before.
+      session.engine.frameAll();
       const picture = await createImageBitmap(await session.picture(1080, 560));
       const canvas = new OffscreenCanvas(picture.width, picture.height);
       canvas.getContext("2d")?.drawImage(picture, 0, 0);
