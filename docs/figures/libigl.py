@@ -182,9 +182,14 @@ def rest_error(name, weights):
     return np.linalg.norm(weights @ cage - points, axis=1) / diagonal(cage)
 
 
+def power(x, digits=0):
+    """A number such as 6.5e-5."""
+    return f"{x:.{digits}e}".replace("e-0", "e-") if x else "0"
+
+
 def table(header, rows):
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
+    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (header, *rows)]
+    return "\n".join([lines[0], "|---" * len(header) + "|", *lines[1:]])
 
 
 def stages(bind):
@@ -194,7 +199,7 @@ def stages(bind):
 def common(name, bind):
     return [
         f"{bind['unknowns']:,}", *stages(bind), f"{bind['memory']:.0f}",
-        f"{bind['weights'].min():.0e}", f"{rest_error(name, bind['weights']).max():.0e}",
+        power(bind['weights'].min()), power(rest_error(name, bind['weights']).max()),
     ]
 
 
@@ -212,7 +217,7 @@ def armadillo():
     rows = []
     for label, bind in binds:
         error = np.abs(bind["weights"] - reference)
-        rows.append([label, *common("armadillo", bind), f"{error.mean():.1e}", f"{error.max():.1e}"])
+        rows.append([label, *common("armadillo", bind), power(error.mean(), 1), power(error.max(), 1)])
     return table(["Armadillo", *COMMON, "mean error", "largest error"], rows)
 
 
@@ -226,7 +231,7 @@ def other_models():
             f"{name}: `harmonic`, {TETRAHEDRA[1] // 1000}k": repeated(libigl, name, TETRAHEDRA[1]),
         }
         for label, bind in binds.items():
-            differences = [f"{np.abs(bind['weights'] - f['weights']).mean():.1e}" for f in fine]
+            differences = [power(np.abs(bind['weights'] - f['weights']).mean(), 1) for f in fine]
             rows.append([label, *common(name, bind), *differences])
     fine = [f"Cagework, g = {GRIDS[2]}", f"`harmonic`, {TETRAHEDRA[2] // 1000}k"]
     return table(["model", *COMMON, *(f"difference from {x}" for x in fine)], rows)
@@ -238,8 +243,8 @@ def bounded_biharmonic():
         weights = bind["weights"] / sums
         error = rest_error("armadillo", weights)
         return [
-            label, f"{sum(bind['seconds']):.2g}", f"{bind['weights'].min():.0e}", f"{np.abs(sums - 1).max():.0e}",
-            f"{(weights > 0.01).sum(axis=1).mean():.1f}", f"{error.mean():.0e}", f"{error.max():.0e}",
+            label, f"{sum(bind['seconds']):.2g}", power(bind['weights'].min()), power(np.abs(sums - 1).max()),
+            f"{(weights > 0.01).sum(axis=1).mean():.1f}", power(error.mean()), power(error.max()),
         ]
 
     rows = [row(f"Cagework, g = {GRIDS[0]}", alone(cagework, "armadillo", GRIDS[0]))]
