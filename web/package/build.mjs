@@ -17,6 +17,7 @@ execFileSync("npx", ["--no-install", "tsc", "--project", here], { stdio: "inheri
 for (const [folder, name] of [
   ["pkg", "cagework"],
   ["pkg-webgl", "cagework_webgl"],
+  ["pkg-compute", "cagework_compute"],
 ]) {
   mkdirSync(join(dist, folder), { recursive: true });
   for (const file of [`${name}.js`, `${name}_bg.wasm`]) {

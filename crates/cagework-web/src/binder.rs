@@ -2,22 +2,21 @@
 //!
 //! The worker has its own GPU device. Its methods take and return arrays; the page passes the results to `Engine`.
 
+#[cfg(feature = "full")]
+pub(crate) mod page;
 mod results;
 
 use std::cell::RefCell;
 
-use cagework_cage::check::{check_smooth, repair_smooth};
-use cagework_cage::samples::{self, Sample};
+use cagework_cage::check::check_smooth;
 use cagework_cage::{CageOptions, GeneratedCage, generate_with_skeleton};
 use cagework_core::field::{self, Lattice};
 use cagework_core::options::OutsidePolicy;
-use cagework_core::progress::NoProgress;
-use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Binding, ControlSet, Controls, Coordinates};
-use cagework_editor::{PageBindOptions, carry_poses};
+use cagework_core::{BindOptions, Binding, ControlSet, Controls};
+use cagework_editor::PageBindOptions;
+#[cfg(feature = "full")]
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
-use cagework_io::{Model, ModelFormat, write_mesh_glb};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use js_sys::{Float32Array, Function};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -26,18 +25,19 @@ use crate::arrays::{flat, points};
 use crate::cage::{CageArrays, RigArrays, control_set};
 use crate::clock::Listener;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::opening::PoseArrays;
-use crate::options::{READ_LIMIT, decode, is_on_cpu};
+use crate::options::decode;
+#[cfg(feature = "full")]
+use crate::options::is_on_cpu;
 use crate::views::object;
 use crate::weights::Offsets;
 
 pub use results::BindResult;
-pub(crate) use results::BuiltSample;
 
 /// Binds models and slices, generates, checks and repairs cages, and builds samples.
 #[wasm_bindgen]
 pub struct Binder {
     /// The GPU of the last bind on a GPU.
+    #[cfg(feature = "full")]
     gpu: RefCell<Option<GpuContext>>,
 }
 
@@ -47,7 +47,10 @@ impl Binder {
     #[wasm_bindgen(constructor)]
     #[allow(clippy::new_without_default, reason = "constructed by JavaScript only")]
     pub fn new() -> Self {
-        Self { gpu: RefCell::default() }
+        Self {
+            #[cfg(feature = "full")]
+            gpu: RefCell::default(),
+        }
     }
 
     /// Computes the harmonic coordinates of `positions`, `[n_points, 3]`. The last `extra_points` points are not
@@ -74,53 +77,6 @@ impl Binder {
         let binding = self.run(&at, &set, request, progress).await?;
         let Binding { weights, frames, outside, report, .. } = binding;
         Ok(BindResult { weights, offsets: Offsets { frames, outside }, report: Some(report) })
-    }
-
-    /// Computes closed-form coordinates of the cage, ignoring its inner controls. Arrays as for `bind`.
-    ///
-    /// # Errors
-    /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
-    #[wasm_bindgen(js_name = bindByFormula)]
-    pub fn bind_by_formula(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
-        positions: &[f32],
-        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
-    ) -> Answer<BindResult> {
-        let set = control_set(cage)?;
-        let kind: Coordinates = decode(kind)?;
-        let weights = kind.weights(&points(positions), set.cage(), READ_LIMIT, &NoProgress)?;
-        Ok(BindResult { weights, offsets: Offsets::default(), report: None })
-    }
-
-    /// Computes the coordinates at the cell centres of a slice, for `Engine.takeSlice`; undefined if no centre is
-    /// inside the cage. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; other arguments as for `bind`.
-    ///
-    /// # Errors
-    /// The errors of `bind`.
-    #[wasm_bindgen(js_name = bindSlice)]
-    pub async fn bind_slice(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
-        axis: usize,
-        fraction: f32,
-        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
-        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-    ) -> Answer<Option<BindResult>> {
-        let request: PageBindOptions = decode(options)?;
-        let set = control_set(cage)?;
-        let centers = Slice::new(&set, &request.options, axis.min(2), fraction).centers();
-        if centers.is_empty() {
-            return Ok(None);
-        }
-        let binding = match self.run(&centers, &set, request, progress).await {
-            // Rounding can put all cell centres of a slice outside the cage if the slice only touches the cage.
-            Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
-            ran => ran?,
-        };
-        let n_controls = Controls::from(&set).n_controls() as u32;
-        let (weights, offsets) = (binding.weights.columns(0..n_controls), Offsets::default());
-        Ok(Some(BindResult { weights, offsets, report: None }))
     }
 
     /// Computes the harmonic coordinates at the points of a lattice around a cage. With `cells`, the number of cells
@@ -187,22 +143,6 @@ impl Binder {
         Ok(object(&CageArrays { bridged, notices: report.notices, kind, refusal, rings, ..arrays }))
     }
 
-    /// Transfers poses, `[n_poses, n_old, 3]`, from an old cage to a new one around the same model, see
-    /// [`carry_poses`]. Returns `[n_poses, n_new, 3]`.
-    ///
-    /// # Errors
-    /// If the arrays are not a valid cage, or the bind fails.
-    #[wasm_bindgen(js_name = carryPoses)]
-    pub fn carry_poses(
-        model: &[f32],
-        new: &[f32],
-        #[wasm_bindgen(unchecked_param_type = "CageArrays")] old: JsValue,
-        poses: &[f32],
-    ) -> Answer<Vec<f32>> {
-        let carried = carry_poses(&points(model), &points(new), &control_set(old)?, &points(poses))?;
-        Ok(flat(&carried))
-    }
-
     /// Finds the faults of a cage around a model with vertices `model`, `[n_vertices, 3]`, for the default grid of a bind.
     ///
     /// # Errors
@@ -216,61 +156,11 @@ impl Binder {
         let grid = BindOptions::default().grid;
         Ok(object(&check_smooth(&mesh, Some(&points(model)), Some(grid), smooth).problems))
     }
-
-    /// Repairs a cage. Arrays as for `checkCage`. The repaired cage has no inner controls.
-    ///
-    /// # Errors
-    /// If the arrays are not a polygon mesh, or the cage cannot be grown until it encloses the model.
-    #[wasm_bindgen(js_name = repairCage, unchecked_return_type = "CageArrays")]
-    pub fn repair_cage(
-        #[wasm_bindgen(unchecked_param_type = "Repair")] kind: JsValue,
-        model: &[f32],
-        #[wasm_bindgen(unchecked_param_type = "CageArrays")] cage: JsValue,
-    ) -> Answer<JsValue> {
-        let (mesh, smooth) = decode::<CageArrays>(cage)?.alone()?;
-        let repaired = repair_smooth(&mesh, &[decode(kind)?], Some(&points(model)), smooth)?;
-        Ok(object(&CageArrays::of(&repaired.mesh)))
-    }
-
-    /// Identifiers of the built-in samples, which `buildSample` takes.
-    pub fn samples() -> Vec<String> {
-        samples::all().iter().map(|sample| sample.id.to_owned()).collect()
-    }
-
-    /// Builds the sample capture "knot", whose splats are computed by a formula, as an SPZ file.
-    ///
-    /// # Errors
-    /// If memory is exhausted.
-    #[wasm_bindgen(js_name = knotCapture)]
-    pub fn knot_capture() -> Answer<Vec<u8>> {
-        let model = Model::of_splats("knot", samples::knot(), DVec3::ZERO)?;
-        Ok(model.write(ModelFormat::Spz, &model.positions)?)
-    }
-
-    /// Builds the sample with this identifier.
-    ///
-    /// # Errors
-    /// If no sample has this identifier.
-    #[wasm_bindgen(js_name = buildSample, unchecked_return_type = "BuiltSample")]
-    pub fn build_sample(id: &str) -> Answer<JsValue> {
-        let unknown = || Fault::new(ErrorName::Error, format!("there is no sample called {id:?}"));
-        let Sample { name, mesh, colours, rig, cage, poses, grip, .. } =
-            samples::build(id).ok_or_else(unknown)?;
-        let glb = write_mesh_glb(&name, &mesh, &colours, rig.as_ref())?;
-        let pose =
-            |(name, at): (String, Vec<Vec3>)| PoseArrays { name, positions: flat(&at).as_slice().into() };
-        Ok(object(&BuiltSample {
-            glb: glb.as_slice().into(),
-            positions: flat(&mesh.positions).as_slice().into(),
-            cage: CageArrays::of(&cage),
-            poses: poses.into_iter().map(pose).collect(),
-            grip: mesh.positions[grip as usize].to_array(),
-        }))
-    }
 }
 
 impl Binder {
     /// Returns a working GPU: the GPU of the last bind, or a new one.
+    #[cfg(feature = "full")]
     async fn open(&self) -> Answer<GpuContext> {
         let last = self.gpu.borrow().clone();
         if let Some(gpu) = last.filter(|gpu| gpu.check().is_ok()) {
@@ -289,9 +179,10 @@ impl Binder {
         progress: Function,
     ) -> Answer<Binding> {
         let listener = Listener::new(progress);
-        if is_on_cpu(&request) {
-            return Ok(cagework_core::bind(positions, set, &request.options, &listener)?);
+        #[cfg(feature = "full")]
+        if !is_on_cpu(&request) {
+            return Ok(bind_on(positions, set, &request.options, &listener, &self.open().await?).await?);
         }
-        Ok(bind_on(positions, set, &request.options, &listener, &self.open().await?).await?)
+        Ok(cagework_core::bind(positions, set, &request.options, &listener)?)
     }
 }

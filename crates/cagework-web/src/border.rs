@@ -25,7 +25,7 @@ use cagework_pose::pull::DragOptions;
 use serde_json::{Map, Value, json};
 use ts_rs::{Config, TS, TypeVisitor};
 
-use crate::binder::BuiltSample;
+use crate::binder::page::BuiltSample;
 use crate::cage::RigArrays;
 use crate::error::ErrorName;
 use crate::folds::FoldArrays;

@@ -7,33 +7,43 @@
 
 // Only browsers have canvases. Everything else also compiles natively, for tests and lints.
 #![cfg_attr(
-    not(target_family = "wasm"),
+    not(all(target_family = "wasm", feature = "full")),
     allow(dead_code, unused_imports, reason = "used only by code for the browser")
 )]
 
 mod arrays;
 pub mod binder;
-#[cfg(test)]
+#[cfg(all(test, feature = "full"))]
 mod border;
 mod cage;
 mod clock;
-#[cfg(target_family = "wasm")]
+pub mod deformer;
+#[cfg(all(target_family = "wasm", feature = "full"))]
 pub mod engine;
 mod error;
 mod field;
+#[cfg(feature = "full")]
 mod folds;
-#[cfg(target_family = "wasm")]
+#[cfg(all(target_family = "wasm", feature = "full"))]
 mod gpu;
+#[cfg(feature = "full")]
 mod incoming;
+#[cfg(feature = "full")]
 pub mod loaded;
+#[cfg(feature = "full")]
 mod opening;
 pub mod options;
+#[cfg(feature = "full")]
 mod problems;
+#[cfg(feature = "full")]
 pub mod puller;
+#[cfg(feature = "full")]
 pub mod reshape;
+#[cfg(feature = "full")]
 mod scene;
+#[cfg(feature = "full")]
 mod state;
-#[cfg(target_family = "wasm")]
+#[cfg(all(target_family = "wasm", feature = "full"))]
 mod surface;
 mod views;
 mod weights;

@@ -1,11 +1,10 @@
-//! Methods for the npm package that deform model files and apply weights without a GPU.
+//! Methods for the npm package that deform model files.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use cagework_core::deform::deform_finite;
+use cagework_core::Controls;
 use cagework_core::options::UnknownWord;
-use cagework_core::{Controls, Frames, Weights};
 use cagework_editor::{PageBindOptions, RigOptions};
 use cagework_io::Model;
 use cagework_job::{BoundPoints, Job, JobOptions, Poses};
@@ -23,7 +22,6 @@ use crate::error::{Answer, ErrorName, Fault};
 use crate::loaded::LoadedModel;
 use crate::options::decode;
 use crate::views::object;
-use crate::weights::BoundArrays;
 
 #[wasm_bindgen]
 impl LoadedModel {
@@ -142,40 +140,5 @@ impl Binder {
         let posed = HumanoidCage::new(Controls::from(&set).rest(), &[], &model.positions, &rig, &humanoid);
         let posed = posed.with_bind(&bound.weights, &model.positions, &rig, &humanoid);
         Ok(flat(&posed.pose(&proportions)))
-    }
-}
-
-/// Weights for deforming points by many poses.
-#[wasm_bindgen]
-pub struct Deformer {
-    n_controls: usize,
-    weights: Weights,
-    frames: Frames,
-}
-
-#[wasm_bindgen]
-impl Deformer {
-    /// Creates a deformer from weights for `n_controls` controls.
-    ///
-    /// # Errors
-    /// If the arrays do not match each other or `n_controls`.
-    #[wasm_bindgen(constructor)]
-    pub fn new(
-        n_controls: u32,
-        #[wasm_bindgen(unchecked_param_type = "BoundArrays")] rows: JsValue,
-    ) -> Answer<Self> {
-        let n_controls = n_controls as usize;
-        let (weights, frames) = decode::<BoundArrays>(rows)?.bound(n_controls)?;
-        Ok(Self { n_controls, weights, frames })
-    }
-
-    /// Computes the positions of the points, `[n_points, 3]`, in a pose of the controls, `[n_controls, 3]`.
-    ///
-    /// # Errors
-    /// If the pose does not have `n_controls` points, or moves a point beyond the range of 32-bit floats.
-    pub fn deform(&self, posed: &[f32]) -> Answer<Vec<f32>> {
-        let posed = pose(posed, self.n_controls)?;
-        let points = deform_finite(&self.weights, &self.frames, &posed);
-        Ok(flat(&points.map_err(|e| Fault::new(ErrorName::Error, e))?))
     }
 }

@@ -25,8 +25,8 @@ impl Profile {
     }
 }
 
-/// A wasm file: the converter of FBX files, or one of the two builds of `cagework-web`, for browsers with and without
-/// WebGPU.
+/// A wasm file: the converter of FBX files, or one of the builds of `cagework-web`: for browsers with and without WebGPU,
+/// and without files and drawing, for functions of the npm package.
 struct Artifact {
     /// Cargo's subcommand, and arguments that select the package and its features.
     build: &'static [&'static str],
@@ -39,8 +39,8 @@ struct Artifact {
 }
 
 /// All artifacts, in build order. Cargo keeps only the artifact of the last build of `cagework-web`, and must link the
-/// other build again. The build for browsers with WebGPU comes last, because developers repeat it most often.
-const ARTIFACTS: [Artifact; 3] = [
+/// other builds again. The build for browsers with WebGPU comes last, because developers repeat it most often.
+const ARTIFACTS: [Artifact; 4] = [
     Artifact {
         build: &["rustc", "--package", "cagework-fbx", "--crate-type", "cdylib"],
         output: "cagework_fbx.wasm",
@@ -48,7 +48,14 @@ const ARTIFACTS: [Artifact; 3] = [
         name: "cagework_fbx",
     },
     Artifact {
+        // It contains nothing of WebGL. With the features of the next build, dependencies are compiled once for both.
         build: &["build", "--package", "cagework-web", "--no-default-features", "--features", "webgl"],
+        output: "cagework_web.wasm",
+        package: "web/package/src/pkg-compute",
+        name: "cagework_compute",
+    },
+    Artifact {
+        build: &["build", "--package", "cagework-web", "--no-default-features", "--features", "webgl,full"],
         output: "cagework_web.wasm",
         package: "web/package/src/pkg-webgl",
         name: "cagework_webgl",

@@ -4,7 +4,7 @@ import { indicesOf, optionsOf, originOf, pointsOf, poseOf, requireKnown, triangl
 import type { BindOptions, CageArrays, NamedFile } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, USUAL_SOLVERS } from "./contract/generated";
 import type { Deformer } from "./pkg/cagework";
-import { createPool } from "./pool";
+import { createPool, type Pool } from "./pool";
 import type { Package } from "./session/artifact";
 import { type Client, named } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
@@ -21,17 +21,25 @@ export interface Runtime {
 
 const CALL_OPTIONS: Required<{ [K in keyof CallOptions]: null }> = { signal: null, onProgress: null };
 
-export function createApi(open: () => Promise<Runtime>): Api {
-  const runtime = once(open);
-  const workers = once(async () => {
-    const { openClient, most } = await runtime();
-    return createPool(openClient, most);
-  });
+/**
+ * Creates the functions. `openFull` opens the build with files and the GPU, `openCompute` the smaller one that suffices
+ * for the other functions. They use the full build if it is open already.
+ */
+export function createApi(openFull: () => Promise<Runtime>, openCompute = openFull): Api {
+  const full = new Build(openFull);
+  const compute = openCompute === openFull ? full : new Build(openCompute);
+  const buildFor = ({ backend }: Partial<BindOptions> = {}) =>
+    backend === "gpu" || full.isOpen ? full : compute;
   /**
-   * Runs a job in a worker. Rejects immediately if `signal` aborts or `onProgress` throws an error, even while the job
+   * Runs a job in a worker of a build. Rejects immediately if `signal` aborts or `onProgress` throws an error, even while the job
    * is queued or the module loads.
    */
-  const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: CallOptions) =>
+  const run = <K extends JobKind>(
+    build: Build,
+    job: K,
+    input: Jobs[K]["input"],
+    { signal, onProgress }: CallOptions,
+  ) =>
     new Promise<Jobs[K]["output"]>((resolve, reject) => {
       const ended = new AbortController();
       const giveUp = (reason: unknown) => {
@@ -48,13 +56,14 @@ export function createApi(open: () => Promise<Runtime>): Api {
           giveUp(error);
         }
       };
-      workers()
+      build
+        .workers()
         .then((pool) => pool.run(job, input, ended.signal, hearStep))
         .then(resolve, reject)
         .finally(() => signal?.removeEventListener("abort", hearSignal));
     });
   const requireGpu = async ({ backend }: Partial<BindOptions>) => {
-    if (backend !== "gpu" || (await runtime()).hasGpu) return;
+    if (backend !== "gpu" || (await full.runtime()).hasGpu) return;
     throw named("NoAdapter", 'WebGPU is missing here: leave out backend: "gpu"');
   };
   const deformers = new WeakMap<Weights, Deformer>();
@@ -69,7 +78,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
         options: bindOptions(options),
       };
       await requireGpu(options);
-      const { report, ...arrays } = await run("bind", input, options);
+      const { report, ...arrays } = await run(buildFor(options), "bind", input, options);
       if (!report) throw named("Error", "the bind left no report");
       return { weights: { ...arrays, controls: input.cage.positions.length / 3 }, report };
     },
@@ -81,7 +90,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const { origin, rig } = mesh;
       const input = { positions, triangles, rig, model: positions, options: asked, smooth: 0 };
       if (origin) originOf("origin", origin);
-      const made = await run("cage", input, options);
+      const made = await run(buildFor(), "cage", input, options);
       return {
         ...(origin ? { origin } : {}),
         positions: made.positions,
@@ -94,7 +103,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
     },
     async deform(weights, posed) {
       const pose = pointsOf("posed", posed);
-      const { pkg } = await runtime();
+      const { pkg } = await buildFor().runtime();
       let deformer = deformers.get(weights);
       if (!deformer) {
         deformer = new pkg.Deformer(weights.controls, weights);
@@ -108,8 +117,9 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const input = { cage: arrays, cells, options: bindOptions(options) };
       const pose = poseOf(posed, arrays.positions);
       await requireGpu(options);
-      const { pkg } = await runtime();
-      const map = new pkg.FieldMap(arrays, cells, await run("lattice", input, options));
+      const build = buildFor(options);
+      const { pkg } = await build.runtime();
+      const map = new pkg.FieldMap(arrays, cells, await run(build, "lattice", input, options));
       map.pose(pose);
       return {
         pose: (next) => map.pose(poseOf(next, arrays.positions)),
@@ -136,7 +146,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
         rig: optionsOf(RIG_DEFAULTS, options),
       };
       await requireGpu(options);
-      return (await run("reshape", input, options)) as Uint8Array<ArrayBuffer>;
+      return (await run(full, "reshape", input, options)) as Uint8Array<ArrayBuffer>;
     },
     async proportions(model, cage, factors, options = {}) {
       const { preset = null, bones = {}, ...rest } = options;
@@ -149,14 +159,37 @@ export function createApi(open: () => Promise<Runtime>): Api {
         options: bindOptions(rest),
       };
       await requireGpu(rest);
-      return run("proportions", input, rest);
+      return run(full, "proportions", input, rest);
     },
     async readModel(model, options = {}) {
       requireKnown(options, CALL_OPTIONS, { name: null, states: null, clip: null });
       const { states = false, clip } = options;
-      return run("model", { files: [fileOf(model, options)], states, clip }, options);
+      return run(full, "model", { files: [fileOf(model, options)], states, clip }, options);
     },
   };
+}
+
+/** A build of the wasm module: opened by the first function that needs it. */
+class Build {
+  /** Whether it was opened, or is being opened. */
+  isOpen = false;
+  readonly runtime: () => Promise<Runtime>;
+  readonly workers: () => Promise<Pool>;
+
+  constructor(open: () => Promise<Runtime>) {
+    const runtime = once(open);
+    this.runtime = async () => {
+      this.isOpen = true;
+      return runtime().catch((error: unknown) => {
+        this.isOpen = false;
+        throw error;
+      });
+    };
+    this.workers = once(async () => {
+      const { openClient, most } = await this.runtime();
+      return createPool(openClient, most);
+    });
+  }
 }
 
 /** Returns a function that calls `open` once. After a failure, such as a failed download, its next call tries again. */

@@ -1,7 +1,7 @@
 /** The package in a browser. Every function except `deform` runs in a worker. */
 
-import { createApi } from "./api";
-import { compile } from "./session/artifact";
+import { createApi, type Runtime } from "./api";
+import { type Artifact, compile } from "./session/artifact";
 import { createClient } from "./session/client";
 import { loadPart } from "./session/parts";
 import type { Api } from "./types";
@@ -9,14 +9,18 @@ import type { Api } from "./types";
 /** Maximum number of parallel workers. A bind keeps one core busy, and each worker takes memory. */
 const MAX_WORKERS = 4;
 
-const api = /* @__PURE__ */ createApi(async () => {
-  const { WEBGPU } = await loadPart(import("./session/webgpu"));
-  const module = await compile(WEBGPU.wasm);
-  await WEBGPU.pkg.default({ module_or_path: module });
+const api = /* @__PURE__ */ createApi(
+  async () => runtimeOf((await loadPart(import("./session/webgpu"))).WEBGPU),
+  async () => runtimeOf((await loadPart(import("./session/compute"))).COMPUTE),
+);
+
+async function runtimeOf({ pkg, wasm, openWorker }: Artifact): Promise<Runtime> {
+  const module = await compile(wasm);
+  await pkg.default({ module_or_path: module });
   const most = Math.min(MAX_WORKERS, navigator.hardwareConcurrency);
-  const openClient = () => createClient(module, WEBGPU.openWorker);
-  return { pkg: WEBGPU.pkg, openClient, most, hasGpu: "gpu" in navigator };
-});
+  const openClient = () => createClient(module, openWorker);
+  return { pkg, openClient, most, hasGpu: "gpu" in navigator };
+}
 
 // The functions are documented here and not at `Api`, because editors show the comment of the imported name.
 /**

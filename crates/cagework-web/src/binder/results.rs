@@ -2,13 +2,10 @@
 
 use cagework_core::Weights;
 use cagework_core::report::BindReport;
-use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
-use serde::Serialize;
+use js_sys::{Array, Float32Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::cage::CageArrays;
-use crate::opening::PoseArrays;
 use crate::views::{object, optional};
 use crate::weights::{BoundArrays, Offsets};
 
@@ -18,24 +15,6 @@ pub struct BindResult {
     pub(super) weights: Weights,
     pub(super) offsets: Offsets,
     pub(super) report: Option<BindReport>,
-}
-
-/// A built-in sample: model, cage and poses.
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct BuiltSample {
-    /// The model as a GLB file.
-    #[serde(with = "serde_wasm_bindgen::preserve")]
-    #[cfg_attr(test, ts(type = "Uint8Array"))]
-    pub(super) glb: Uint8Array,
-    /// Vertices of the model. `[n_vertices, 3]`
-    #[serde(with = "serde_wasm_bindgen::preserve")]
-    #[cfg_attr(test, ts(type = "Float32Array"))]
-    pub(super) positions: Float32Array,
-    pub(super) cage: CageArrays,
-    pub(super) poses: Vec<PoseArrays>,
-    /// Point of the model that the page asks the user to pull first, object units.
-    pub(super) grip: [f32; 3],
 }
 
 #[wasm_bindgen]

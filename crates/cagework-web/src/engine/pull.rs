@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use cagework_core::view::View as _;
 use cagework_editor::{Grab, SurfacePoint};
 use glam::{Vec2, Vec3};
 use js_sys::{Array, Float64Array, Uint32Array};

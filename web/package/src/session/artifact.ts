@@ -1,8 +1,8 @@
-/** The two builds of the wasm module: one for WebGPU, and one for WebGL2, which is downloaded only when needed. */
+/** The builds of the wasm module: for WebGPU, for WebGL2, and without files and drawing. Each is downloaded when needed. */
 
 import { fetchPart } from "./parts";
 
-/** The exports that both builds share. */
+/** The exports of a build. */
 export type Package = typeof import("../pkg/cagework");
 
 /** One build of the wasm module: its JavaScript, its wasm file and its worker. */
