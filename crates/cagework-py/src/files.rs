@@ -131,6 +131,21 @@ pub(crate) fn vertices_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResul
     Ok(mesh_of(value)?.map_or_else(|| value.clone(), |(vertices, _)| vertices))
 }
 
+/// Returns the vertices and triangles of a model.
+///
+/// # Errors
+/// Those of [`Source::of`] and [`Source::read`]; `ModelError` for a model without faces.
+pub(crate) fn surface_of<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyAny>, Vec<[u32; 3]>)> {
+    let source = Source::of(name, value)?;
+    let model = work::run(value.py(), move |_| source.read())??;
+    model.require_faces().map_err(error::model)?;
+    let origin = model.origin();
+    Ok((arrays::array_of(value.py(), model.positions, origin)?, model.triangles))
+}
+
 /// Reads a file that the model `main` refers to. `None` if it does not exist.
 fn beside(main: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     let read = cagework_files::read_beside(main, name)?;

@@ -11,14 +11,14 @@ use pyo3::types::PyDict;
 
 use crate::bind::bind_options;
 use crate::cage::Cage;
-use crate::{arrays, error, work};
+use crate::{arrays, error, files, work};
 
 /// Solves for the pose of the cage that moves vertices of the model to targets with little bending:
 /// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5,
 /// progress=None, grid="auto", ...)
 /// -> [n_cage, 3] float64, object units
 ///
-/// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
+/// vertices: [n, 3]; triangles: [m, 3], or None with a model, as read_model takes it, in place of the vertices; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
 /// targets; pins: [l] vertices that stay in place; report: of bind, for points with offsets; start: [n_cage, 3] initial
 /// pose, by default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size;
 /// None for automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the
@@ -44,7 +44,7 @@ use crate::{arrays, error, work};
 pub(crate) fn pull<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
-    triangles: &Bound<'py, PyAny>,
+    triangles: Option<&Bound<'py, PyAny>>,
     cage: &Bound<'py, Cage>,
     weights: &Bound<'py, PyAny>,
     grabs: &Bound<'py, PyAny>,
@@ -93,7 +93,7 @@ impl Puller {
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
-        triangles: &Bound<'_, PyAny>,
+        triangles: Option<&Bound<'_, PyAny>>,
         cage: &Bound<'_, Cage>,
         weights: &Bound<'_, PyAny>,
         report: Option<&Bound<'_, PyAny>>,
@@ -104,8 +104,12 @@ impl Puller {
         // cage may not enclose them.
         let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
         let (controls, origin) = (cage.get().controls(), cage.get().origin());
-        let positions = arrays::finite_points("vertices", vertices, None, origin)?.as_slice().to_vec();
-        let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
+        let (vertices, triangles) = match triangles {
+            Some(triangles) => (vertices.clone(), arrays::triangles(triangles)?),
+            None => files::surface_of("vertices", vertices)?,
+        };
+        let positions = arrays::finite_points("vertices", &vertices, None, origin)?.as_slice().to_vec();
+        let mesh = TriMesh { positions, triangles };
         let (weights, frames) = arrays::join_offsets(report, arrays::weights(weights)?)?;
         let prepare = |progress: &dyn Progress| -> PyResult<Pull> {
             let probes = Probes::new(&mesh, controls).map_err(error::pull)?;

@@ -78,6 +78,8 @@ def test_pull_equals_the_command(model, cage, tmp_path):
     weights, report = cw.bind(points, cage, grid=24)
     options = {"pins": [bottom], "report": report, "reach": float("inf"), "grid": 24}
     posed = cw.pull(points, triangles, cage, weights, [top], [to], **options)
+    for same in (tmp_path / "model.obj", (points, triangles)):
+        assert np.array_equal(cw.pull(same, None, cage, weights, [top], [to], **options), posed)
     assert np.array_equal(posed.astype(np.float32), cw.read_model(tmp_path / "posed.obj")[0])
     assert np.abs(weights @ posed - points)[bottom].max() < 0.01
     assert np.abs((weights @ posed)[top] - to).max() < 0.01

@@ -118,8 +118,8 @@ class Field:
 class Puller:
     def __new__(
         cls,
-        vertices: ArrayLike,
-        triangles: ArrayLike,
+        vertices: _Points,
+        triangles: ArrayLike | None,
         cage: Cage,
         weights: Any,
         *,
@@ -197,8 +197,8 @@ def deform(
     weights: Any, posed: ArrayLike, report: dict[str, Any] | None = None
 ) -> NDArray[np.float32] | NDArray[np.float64]: ...
 def pull(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
+    vertices: _Points,
+    triangles: ArrayLike | None,
     cage: Cage,
     weights: Any,
     grabs: ArrayLike,
