@@ -5,8 +5,9 @@ import bpy
 
 from . import animation, bake, binding, operators, rig
 
-# Width of borders and of an icon, and size of the text, in pixels at a resolution scale of 1.
-BORDERS, ICON, TEXT = 40, 20, 11
+# Width of borders and of an icon, and size of the text, in pixels at a resolution scale of 1. Larger than in Blender's
+# theme, because builds of Linux distributions use wider fonts.
+BORDERS, ICON, TEXT = 44, 20, 13
 # Operators for a bound mesh.
 ACTIONS = [
     operators.Pull,
@@ -52,9 +53,8 @@ class Panel(bpy.types.Panel):
         obj = chosen[0]
         bound = obj.data.cagework
         layout.label(text=obj.name if len(chosen) == 1 else f"{obj.name} and {len(chosen) - 1} more", icon="MESH_DATA")
-        row = layout.row(align=True)
-        row.operator("cagework.make_cage").vertices = bound.vertices
-        row.prop(bound, "vertices")
+        layout.prop(bound, "vertices")
+        layout.operator("cagework.make_cage").vertices = bound.vertices
         layout.prop(bound, "cage")
         layout.prop(bound, "grid")
         row = layout.row(align=True)
@@ -62,11 +62,11 @@ class Panel(bpy.types.Panel):
         if not bound.stamp:
             return
         row.operator("cagework.bind", text="Rebind").keep_rest = True
-        box = layout.box()
+        box = layout.box().column(align=True)
         for line in bound.report.split("\n"):
             notice(box, context, line)
         if fault := binding.problem(obj, context.scene) or animation.warning(obj, context.scene):
-            box = layout.box()
+            box = layout.box().column(align=True)
             box.alert = True
             notice(box, context, fault, "ERROR")
         sharing = sum(o.data == obj.data for o in context.scene.objects) - 1
