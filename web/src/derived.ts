@@ -116,7 +116,15 @@ export function isCageSparse(state: AppState): boolean {
 export function asksToPull(state: AppState): boolean {
   const { step, grip, pullReady, posed, undo, gesture, playing, clip, tour, scene } = state;
   const isUntouched = grip !== null && pullReady && !posed && undo === null && step !== "cage";
-  return isUntouched && scene.pull && !gesture && !playing && clip.clip === null && tour === null;
+  return (
+    isUntouched &&
+    scene.pull &&
+    scene.colour === "material" &&
+    !gesture &&
+    !playing &&
+    clip.clip === null &&
+    tour === null
+  );
 }
 
 /** Saved poses that fit the current cage. */

@@ -90,6 +90,28 @@ impl BoundModels {
         Self { weights: Arc::new(weights), frames: Arc::new(frames), rig, outside, joints }
     }
 
+    /// Control whose weight a picture shows best: its squared weights have the largest sum over the vertices on the near
+    /// side of the models' centre. `positions`: of the vertices, object units; `backward`: unit vector towards the eye.
+    /// 0 without such vertices.
+    #[must_use]
+    pub fn clearest_control(&self, positions: &[Vec3], backward: Vec3, n_controls: usize) -> u32 {
+        let centre = positions.iter().sum::<Vec3>() / positions.len().max(1) as f32;
+        let mut sums = vec![0.0; n_controls];
+        for (v, at) in positions.iter().enumerate().take(self.weights.n_rows()) {
+            if (*at - centre).dot(backward) <= 0.0 {
+                continue;
+            }
+            let (columns, weights) = self.weights.row(v);
+            for (&column, weight) in columns.iter().zip(weights) {
+                if let Some(sum) = sums.get_mut(column as usize) {
+                    *sum += weight * weight;
+                }
+            }
+        }
+        let clearest = sums.iter().enumerate().rev().max_by(|a, b| a.1.total_cmp(b.1));
+        clearest.map_or(0, |(control, _)| control as u32)
+    }
+
     /// Size of the weights, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -361,6 +383,18 @@ pub(crate) mod tests {
         assert_eq!(deformed(&pose).unwrap(), [pose[0], rest[1], pose[2], pose[3]]);
         assert_eq!(deformed(cage).unwrap(), rest);
         assert!(matches!(deformed(&pose[1..]), Err(BoundError::OtherCage)));
+    }
+
+    /// Two vertices follow control 5, one follows control 2, and the vertex at the far side follows control 7.
+    #[test]
+    fn the_clearest_control_moves_most_of_the_near_side() {
+        let editor = boxed();
+        let rows = Weights::new(8, (0..=4).collect(), vec![2, 5, 5, 7], vec![1.0; 4]).unwrap();
+        let bound = BoundModels::new(editor.document(), rows, Frames::default(), Vec::new());
+        let at = [Vec3::X, Vec3::X, Vec3::X, -9.0 * Vec3::X];
+        assert_eq!(bound.clearest_control(&at, Vec3::X, 8), 5);
+        assert_eq!(bound.clearest_control(&at, -Vec3::X, 8), 7, "seen from behind");
+        assert_eq!(bound.clearest_control(&[], Vec3::X, 8), 0, "without vertices");
     }
 
     /// Vertex 1 of the model is outside the cage, at a constant offset of 0.5 in x from the cage's first vertex.

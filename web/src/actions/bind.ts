@@ -100,6 +100,8 @@ export function createBind(ctx: Context) {
       const engine = ctx.engine();
       return bound || engine.hasWeights || bindRun?.revision === engine.revision;
     },
+    /** The handle whose weight a picture shows best; 0 before a bind. */
+    clearestControl: () => ctx.engine().clearestControl(),
     /** Draws the model with the colours of a weight; undefined if that is not possible now. */
     async drawWeight(width: number, height: number, column: number): Promise<Blob | undefined> {
       if (!store.get().bound) return undefined;

@@ -61,7 +61,7 @@ const FIRST = {
 function howStops(gpu: boolean) {
   return {
     cage: { ...RAT, step: "pose", binds: [{}] },
-    weight: { ...RAT, step: "pose", binds: [{}], scene: { colour: "weight" }, vertex: 57 },
+    weight: { ...RAT, step: "pose", binds: [{}], scene: { colour: "weight" }, vertex: 58 },
     grid: {
       ...RAT,
       step: "bind",

@@ -31,6 +31,7 @@ export function BindPanel({ app }: { app: App }) {
       <Fineness app={app} />
       {typeof memory !== "number" && <Memory app={app} />}
       <Fold title={T.bind.how} open={tour !== null}>
+        <p class="hint">{T.bind.harmonic}</p>
         {result && <ReportCard report={result} />}
         {report && earlier.length > 0 && (
           <div class="stack tight">
@@ -50,11 +51,11 @@ export function BindPanel({ app }: { app: App }) {
   );
 }
 
-/** Picture of the weight of the last selected handle, or of the first one. */
+/** Picture of the weight of the last selected handle, or of the one whose weight is seen best. */
 function Weight({ app }: { app: App }) {
   const { report, selected, model } = app.store.get();
   const [picture, setPicture] = useState<string | null>(null);
-  const column = selected.last ?? 0;
+  const column = selected.last ?? app.bind.clearestControl();
   useEffect(() => {
     let isCurrent = true;
     let url: string | undefined;

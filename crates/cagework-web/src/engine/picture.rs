@@ -1,6 +1,9 @@
 //! Methods that draw frames, render pictures, and read positions from the GPU.
 
+use std::sync::Arc;
+
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
+use cagework_editor::BoundModels;
 use cagework_gpu::Session;
 use cagework_gpu::render::{DrawModel, MeshStyle};
 use glam::{Vec2, Vec3};
@@ -114,6 +117,18 @@ impl Engine {
     #[wasm_bindgen(js_name = weightPicture)]
     pub async fn weight_picture(&self, width: u32, height: u32, column: u32) -> Answer<Vec<u8>> {
         self.render_picture([width, height], Subject::Weight(column)).await
+    }
+
+    /// Index of the control whose weight `weightPicture` shows best from the current view; 0 before a bind.
+    #[wasm_bindgen(js_name = clearestControl)]
+    pub fn clearest_control(&self) -> u32 {
+        self.read(|state| {
+            let positions = state.models().positions();
+            let clearest = |bound: &Arc<BoundModels>| {
+                bound.clearest_control(positions, state.camera.backward(), state.pose().len())
+            };
+            state.bound.as_ref().map_or(0, clearest)
+        })
     }
 
     /// Reads from the GPU the vertices deformed with one kind of coordinates. `[n_vertices, 3]`

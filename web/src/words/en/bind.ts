@@ -6,6 +6,8 @@ export const bind = {
   title: "Bind the model to its cage",
   sentence: "After the bind, the model follows its cage.",
   how: "How it works",
+  harmonic:
+    "The weights are harmonic coordinates: imagine one handle at temperature 1 and all others at 0. The temperature that settles inside the cage is the weight of this handle.",
   fineness: "Fineness",
   finenessTip: "Finer takes longer and separates parts that are closer together.",
   finenesses: ["Coarse", "Medium", "Fine", "Very fine"],

@@ -89,7 +89,7 @@ export const tourWords = {
     grid: {
       title: "The grid",
       claim: () =>
-        "A weight is a temperature: this cage vertex is held at 1 and all others at 0. Inside, each cell of a grid settles at the mean of its neighbours.",
+        "A weight is a temperature: this cage vertex is held at 1 and all others at 0. Inside, each cell of a grid settles at the mean of its neighbours. Such weights are called harmonic coordinates.",
       task: "move the slice through the rat, then look at the cells themselves.",
       alone: "the See panel slices the grid of every bound model.",
     },
