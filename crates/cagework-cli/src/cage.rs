@@ -76,8 +76,8 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
             box_mesh(&around.positions, divisions, args.margin)?
         }
         _ => {
-            let rig = Some(&around.rig).filter(|rig| !rig.joints.is_empty());
-            let made = generate_for(&around.positions, &around.triangles, rig, &args.options())?;
+            let made =
+                generate_for(&around.positions, &around.triangles, Some(&around.rig), &args.options())?;
             summary.kind = made.report.kind.to_string();
             (summary.report, summary.rings) = (Some(made.report), made.rings);
             made.cage.to_polygon_mesh()
