@@ -21,6 +21,7 @@ PLATFORMS = {
 
 def build(wheel, out):
     folder = Path(__file__).parent
+    licences = read_licences(wheel)
     tag = wheel.stem.split("-")[-1]
     platforms = next((names for pattern, names in PLATFORMS.items() if re.search(pattern, tag)), None)
     if platforms is None:
@@ -38,7 +39,18 @@ def build(wheel, out):
             if source != Path(__file__):
                 file.write(source, source.name)
         file.write(wheel, f"wheels/{wheel.name}")
+        for name, text in licences.items():
+            file.writestr(name, text)
     return archive
+
+
+def read_licences(wheel):
+    """The licences of this repository, by name. A wheel that `cargo xtask wheel` has not built lacks those of dependencies."""
+    with zipfile.ZipFile(wheel) as file:
+        names = [name for name in file.namelist() if name.startswith("cagework/licences/")]
+        if not names:
+            raise SystemExit(f"{wheel.name} contains no licences: build it with `cargo xtask wheel`")
+        return {Path(name).name: file.read(name) for name in names if Path(name).name.startswith("LICENSE-")}
 
 
 if __name__ == "__main__":

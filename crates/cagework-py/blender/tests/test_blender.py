@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import bmesh
@@ -817,3 +818,5 @@ def test_archive_of_the_extension_is_valid():
     command = [sys.executable, checker, "validate", os.environ["CAGEWORK_EXTENSION"]]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+    with zipfile.ZipFile(os.environ["CAGEWORK_EXTENSION"]) as archive:
+        assert {"LICENSE-MIT", "LICENSE-APACHE"} <= set(archive.namelist())
