@@ -40,8 +40,8 @@ const SLEEVE_SHARE: f32 = 0.7;
 /// Models without a rig keep a shell that has at most three quarters of the vertices of the sleeves.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
-/// `[n_triangles]`, any soup. `rig`: joints at the rest of `positions`; without joints, it counts as no rig. Without a rig, or if its joints have no limbs,
-/// the skeleton is derived from the model's voxels ([`Skeleton::of_surface`]).
+/// `[n_triangles]`, any soup. `rig`: joints at the rest of `positions`; without joints, it counts as no rig. Without a
+/// rig, or if its joints have no limbs, the skeleton is derived from the model's voxels ([`Skeleton::of_surface`]).
 ///
 /// # Errors
 /// [`CageGenError`]. With [`CageKind::Skeleton`], [`CageGenError::Sleeves`] if sleeves are refused.

@@ -18,11 +18,12 @@ use crate::{arrays, error, files, work};
 /// progress=None, grid="auto", ...)
 /// -> [n_cage, 3] float64, object units
 ///
-/// vertices: [n, 3]; triangles: [m, 3], or None with a model, as read_model takes it, in place of the vertices; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
-/// targets; pins: [l] vertices that stay in place; report: of bind, for points with offsets; start: [n_cage, 3] initial
-/// pose, by default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size;
-/// None for automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the
-/// rest shape; options: those of bind, for the points on and near the model at which the solver samples the weights.
+/// vertices: [n, 3]; triangles: [m, 3], or None with a model, as read_model takes it, in place of the vertices; weights:
+/// [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their targets; pins: [l] vertices that stay in place;
+/// report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by default the cage at rest; reach: how far
+/// along the surface the model follows, as a fraction of its size; None for automatic, math.inf for the whole model;
+/// relax: 0 keeps the details of the initial pose, 1 restores the rest shape; options: those of bind, for the points on
+/// and near the model at which the solver samples the weights.
 ///
 /// Binds those points in each call; Puller binds them once for many pulls.
 ///
