@@ -40,7 +40,7 @@ const SLEEVE_SHARE: f32 = 0.7;
 /// Models without a rig keep a shell that has at most three quarters of the vertices of the sleeves.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
-/// `[n_triangles]`, any soup. `rig`: joints at the rest of `positions`; without joints, it counts as no rig. Without a
+/// `[n_triangles]`, any soup. `rig`: joints at the rest of `positions`; an empty one counts as `None`. Without a
 /// rig, or if its joints have no limbs, the skeleton is derived from the model's voxels ([`Skeleton::of_surface`]).
 ///
 /// # Errors
@@ -316,7 +316,7 @@ mod tests {
         let side = (0..n).flat_map(|k| [[k, (k + 1) % n, n + k], [(k + 1) % n, n + (k + 1) % n, n + k]]);
         let triangles: Vec<[u32; 3]> = ends.into_iter().flat_map(cap).chain(side).collect();
         let options = CageOptions::default();
-        // A rig without joints is no rig.
+        // A model without joints can have an empty rig.
         for rig in [None, Some(&Rig::default())] {
             let report = generate_of_kind(&positions, &triangles, rig, &options, &NoProgress).unwrap().report;
             assert!(report.vertices <= 24 && 10 * report.quads >= 7 * report.faces, "{report:?}");
