@@ -320,15 +320,6 @@ mod tests {
         assert!(report.vertices <= 24 && 10 * report.quads >= 7 * report.faces, "{report:?}");
     }
 
-    /// Without a rig, the rat keeps a shell. Models without joints come with an empty rig.
-    #[test]
-    fn an_empty_rig_counts_as_none() {
-        let rat = crate::samples::build("rat").unwrap().mesh;
-        let (rig, options) = (Rig::default(), CageOptions::default());
-        let made = generate_of_kind(&rat.positions, &rat.triangles, Some(&rig), &options, &NoProgress);
-        assert_eq!(made.unwrap().report.kind, CageKind::Shell);
-    }
-
     #[test]
     fn faces_that_span_two_legs_raise_the_score() {
         let figure = biped(false);
